@@ -28,6 +28,7 @@ from mocobot_sim.trial.truth import GroundTruth
 LIMITS: dict[str, dict[str, float]] = {
     "phi_zero": {"zero_rad": 6.6e-4},
     "theta_zero": {"zero_rad": 6.2e-4},
+    "encoder_play": {"play_rad": 5.0e-4},
     "link_length": {"proximal_m": 1.3e-4, "rod_m": 1.5e-4, "base_radius_m": 1.4e-4},
     "base_tilt": {"roll_rad": 7.0e-4, "pitch_rad": 7.0e-4},
     "base_creep": {"x_mps": 1.7e-7, "y_mps": 1.6e-7},

@@ -11,6 +11,7 @@ from estimator.strict import is_number, read_toml
 TEAM = (
     "phi_zero",
     "theta_zero",
+    "encoder_play",
     "link_length",
     "base_tilt",
     "base_creep",

@@ -19,7 +19,8 @@ from scipy.spatial.transform import Rotation
 from estimator import so3
 from estimator.arm.delta import forward_kinematics
 from estimator.arm.dynamics import rotation
-from estimator.arm.motion import ArmData, arm_data
+from estimator.arm.motion import COUNT as SLOTS
+from estimator.arm.motion import ArmData, arm_data, yaw_matrix
 from estimator.arm.unit import Arms, levelled
 from estimator.arrays import Array, inertia_matrix
 from estimator.estimate.grasps import GraspEstimate
@@ -309,14 +310,23 @@ class Bases:
         )
 
 
-def poses(phi: Array, theta: Array, arms: Arms) -> tuple[Array, Array]:
-    """Return R_bi and h [m] in level base frames, (..., N, 3, 3) and (..., N, 3), from true angles (..., N, 3)."""
-    return levelled(arms, rotation(theta), forward_kinematics(phi, arms))
+def poses(phi: Array, theta: Array, arms: Arms, base: Array | None = None) -> tuple[Array, Array]:
+    """Return R_bi and h [m] in level base frames, (..., N, 3, 3) and (..., N, 3), from true angles (..., N, 3).
+
+    Of driving bases, ``base`` are their poses (x, y, yaw), (..., N, 3); the frames then are those at the start.
+    """
+    R, h = levelled(arms, rotation(theta), forward_kinematics(phi, arms))
+    if base is None:
+        return R, h
+    turn = yaw_matrix(base[..., 2])
+    return turn @ R, so3.times(turn, h) + base * [1.0, 1.0, 0.0]
 
 
-def pose_residual(phi: Array, theta: Array, shared: Shared, bases: Bases, arms: Arms) -> Array:
+def pose_residual(
+    phi: Array, theta: Array, shared: Shared, bases: Bases, arms: Arms, base: Array | None = None
+) -> Array:
     """Return e_rot [rad] and e_pos [m] of robots i >= 2, shape (Q, 6 (N - 1)), from true angles (Q, N, 3)."""
-    return pose_error(*poses(phi, theta, arms), shared, bases)
+    return pose_error(*poses(phi, theta, arms, base), shared, bases)
 
 
 def pose_error(R: Array, h: Array, shared: Shared, bases: Bases) -> Array:
@@ -333,12 +343,14 @@ def pose_error(R: Array, h: Array, shared: Shared, bases: Bases) -> Array:
 def robot_data(s: Array, arms: Arms) -> ArmData:
     """Return poses in level base frames, twists and wrenches of robots with true signals s, shape (Q, ..., 21).
 
-    ``arms`` describes one robot, or all robots in the axis before the last.
+    ``arms`` describes one robot, or all robots in the axis before the last. Of driving bases s has 30 entries, the last
+    nine as ``arm_data`` takes them; poses then are in the base frames at the start.
     """
-    phi, phi_dot, phi_ddot, theta, theta_dot, theta_ddot, tau = np.moveaxis(
-        s.reshape(*s.shape[:-1], 7, 3), -2, 0
+    phi, phi_dot, phi_ddot, theta, theta_dot, theta_ddot, tau, *_ = np.moveaxis(
+        s.reshape(*s.shape[:-1], -1, 3), -2, 0
     )
-    data = arm_data((phi, phi_dot, phi_ddot), (theta, theta_dot, theta_ddot), tau, arms)
+    base = s[..., SLOTS:] if s.shape[-1] > SLOTS else None
+    data = arm_data((phi, phi_dot, phi_ddot), (theta, theta_dot, theta_ddot), tau, arms, base)
     R_bi, h = levelled(arms, data.R_bi, data.h)
     return data._replace(R_bi=R_bi, h=h)
 

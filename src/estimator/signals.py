@@ -39,8 +39,8 @@ from estimator.recording.model import Recording
 class GraspData:
     """Data points D_iq = {T_bi, V_i, dV_i/dt, F_i} (paper, section II) of Q samples and N robots.
 
-    {b} is each robot's own base frame (the paper's {i0} up to a constant), {i} its grasp frame on the
-    payload side of the gimbal. Twists and wrenches list the angular part first, as in the paper.
+    {b} is each robot's own base frame (the paper's {i0} up to a constant), of driving bases that at the start; {i} is
+    its grasp frame on the payload side of the gimbal. Twists and wrenches list the angular part first, as in the paper.
 
     Attributes:
         time: sample times [s], shape (Q,).
@@ -121,10 +121,15 @@ def process_recording(recording: Recording, cutoff_hz: float = 5.0, trim_s: floa
         arm = recording.arm(robot)
         read = low_pass(np.concatenate(recording.joints(robot), axis=1), rate_hz, cutoff_hz)
         motion, tau = _derivatives(read[:, :6], rate_hz, keep), apart(read[keep, 6:], 1)
+        base = None
+        if recording.base is not None:
+            path = _derivatives(low_pass(recording.base[:, robot], rate_hz, cutoff_hz), rate_hz, keep)
+            base = np.concatenate(path, axis=-1)
         # Convert in blocks: intermediate results take ten times the memory of the final ones.
         for first in range(0, len(time), BLOCK):
             block = slice(first, first + BLOCK)
-            _fill(data, robot, block, motion[:, block, :3], motion[:, block, 3:], tau[block], arm)
+            phi, theta = motion[:, block, :3], motion[:, block, 3:]
+            _fill(data, robot, block, phi, theta, tau[block], arm, None if base is None else base[block])
     return data
 
 
@@ -134,9 +139,18 @@ def _derivatives(angles: Array, rate_hz: float, keep: slice) -> Array:
     return apart(np.stack([angles[keep], rate[keep], differentiate(rate, rate_hz)[keep]]), 1)
 
 
-def _fill(data: GraspData, robot: int, block: slice, phi: Array, theta: Array, tau: Array, arm: Arms) -> None:
-    """Store data points of one robot from its angles with derivatives, (3, q, 3), and its torques, (q, 3)."""
-    found = arm_data((phi[0], phi[1], phi[2]), (theta[0], theta[1], theta[2]), tau, arm)
+def _fill(
+    data: GraspData,
+    robot: int,
+    block: slice,
+    phi: Array,
+    theta: Array,
+    tau: Array,
+    arm: Arms,
+    base: Array | None,
+) -> None:
+    """Store data points of one robot from its angles with derivatives, (3, q, 3), torques, (q, 3), and base (q, 9)."""
+    found = arm_data((phi[0], phi[1], phi[2]), (theta[0], theta[1], theta[2]), tau, arm, base)
     data.R_bi[block, robot], data.p_bi[block, robot] = levelled(arm, found.R_bi, found.h)
     data.twist[block, robot], data.twist_dot[block, robot] = found.twist, found.twist_dot
     data.wrench[block, robot] = found.wrench

@@ -507,9 +507,14 @@ class SimulateOptions(Options):
     """Signals in the file: driven angles and spring torques, or wrist positions and forces."""
     robots: int | None = None
     """Number of robots of a free trial; if omitted, the number of grasps of the payload."""
+    drive: Annotated[float | None, tyro.conf.arg(metavar="RATIO")] = None
+    """Let the bases of random and periodic trials drive while they carry, and record their wheel odometry. RATIO is the
+    standard deviation of the odometry's relative errors, such as 0.01."""
 
     def check(self) -> None:
         """Raise InputError if options exclude each other or an effect does not exist."""
+        if self.drive is not None and not 0.0 <= self.drive <= 0.1:
+            raise InputError(f"drive is {self.drive:g}; it must be from 0 to 0.1")
         refuse_both(self, "units", "model", "the model has robots of its own, so leave one out")
         for effect in self.effects:
             if isinstance(effect, str):
@@ -518,7 +523,7 @@ class SimulateOptions(Options):
     def check_for(self, payload: object, kinds: Sequence[str]) -> None:
         """Raise InputError for an option that does not apply to these trials or to this payload."""
         needed = {"vias": ("random", "free"), "duration_s": ("periodic",), "robots": ("free",)}
-        check_motion(self, kinds, needed)
+        check_motion(self, kinds, needed | {"drive": ("random", "periodic")})
         if payload is None:
             return
         for name, why in (

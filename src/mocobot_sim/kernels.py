@@ -192,7 +192,7 @@ def update_drives(
         qpos, qvel: state of the physics.
         ctrl: written: motor torques [N m].
         wheel_qpos, wheel_dof, drive: addresses of wheels and motors, shape (N, 4).
-        matrix, inverse: wheel kinematics, shapes (4, 3) and (3, 4).
+        matrix, inverse: wheel kinematics that every base assumes, shapes (N, 4, 3) and (N, 3, 4).
         constants: position gain [1/s], speed gain, integral gain, torque limit [N m], control period [s].
         pose, twist: planned for this tick, shape (N, 3).
         odometry: updated: pose by odometry, shape (N, 3).
@@ -206,9 +206,9 @@ def update_drives(
         for k in range(4):
             step = qpos[wheel_qpos[i, k]] - angle[i, k]
             angle[i, k] += step
-            turn += inverse[0, k] * step
-            along += inverse[1, k] * step
-            across += inverse[2, k] * step
+            turn += inverse[i, 0, k] * step
+            along += inverse[i, 1, k] * step
+            across += inverse[i, 2, k] * step
         # Chord of the arc, as in ``trajectories.moved``.
         half = 0.5 * turn
         chord = math.sin(half) / half if abs(half) > 1e-9 else 1.0
@@ -226,7 +226,7 @@ def update_drives(
         v_y = sin_rest * twist[i, 1] + cos_rest * twist[i, 2] + position_gain * (cos * aside - sin * ahead)
         w = twist[i, 0] + position_gain * rest
         for k in range(4):
-            command = matrix[k, 0] * w + matrix[k, 1] * v_x + matrix[k, 2] * v_y
+            command = matrix[i, k, 0] * w + matrix[i, k, 1] * v_x + matrix[i, k, 2] * v_y
             error = command - qvel[wheel_dof[i, k]]
             torque = gain * error + integral * lag[i, k]
             # Anti-windup: at the torque limit the integral must not grow.

@@ -54,7 +54,7 @@ def test_pendulum_is_measured_by_the_limit_of_its_own_length():
 
 
 def test_every_cause_has_a_limit_and_an_effect():
-    assert set(LIMITS) == set(CAUSES) == set(EFFECTS) - {"law", "zero_scatter", "encoder_play"}
+    assert set(LIMITS) == set(CAUSES) == set(EFFECTS) - {"law", "zero_scatter"}
 
 
 def imports(package) -> dict[str, set[str]]:

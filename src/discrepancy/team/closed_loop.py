@@ -174,6 +174,8 @@ def named_effects(candidate: Candidate, effects: Sequence[Effect] | None) -> Seq
 
 def why_not(recording: Recording) -> str | None:
     """Reason why a recording cannot be simulated again, or None."""
+    if recording.base is not None:
+        return f"{recording.name} is of driving bases, whose contacts are not simulated again"
     if recording.ref is None:
         return f"{recording.name} has no commands (ref_x, ref_y, ref_z)"
     if not recording.metadata.control or "feed_forward_N" not in recording.metadata.control:

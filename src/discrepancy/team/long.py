@@ -57,14 +57,14 @@ def _parts(recording: Recording, longest_s: float) -> list[Recording]:
     out = []
     for k, (start, stop) in enumerate(pairwise(edges)):
         at = slice(max(0, start - trim), stop + trim)
-        ref = None if recording.ref is None else recording.ref[at]
+        ref, base = (None if x is None else x[at] for x in (recording.ref, recording.base))
         time = np.array(recording.time[at])
         name = f"{recording.name}, {recording.time[start]:.0f} to {recording.time[stop - 1]:.0f} s"
         part = replace(
             recording, time=time, phi=recording.phi[at], theta=recording.theta[at], tau=recording.tau[at], ref=ref,
-            name=name,
+            base=base, name=name,
         )  # fmt: skip
-        fields = (part.time, part.phi, part.theta, part.tau, part.ref, part.metadata, part.name)
+        fields = (part.time, part.phi, part.theta, part.tau, part.ref, part.metadata, part.name, part.base)
         out.append(LaterPart(*fields) if k else part)
     return out
 

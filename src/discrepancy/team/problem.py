@@ -649,7 +649,7 @@ def team_problem(
 
     out.shared = unknown([white(linear.by_shared) for linear, white in linears])
     for t, (linear, white) in enumerate(linears):
-        local = white(np.concatenate([linear.by_bases, linear.by_clocks], axis=2))
+        local = white(np.concatenate([linear.by_bases, linear.by_clocks, linear.by_odometry], axis=2))
         none = (np.zeros((*r.shape, local.shape[2])) for r in rows)
         out.local.append(unknown([local if k == t else x for k, x in enumerate(none)]))
     first = out.cells.count

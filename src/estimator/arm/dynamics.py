@@ -120,6 +120,7 @@ def arm_torque(
     design: Arms,
     legs: LegGeometry | None = None,
     h_ddot: Array | None = None,
+    base_ddot: Array | None = None,
 ) -> Array:
     """Return the spring torques that move the unloaded arm [N m], positive raising the link, shape (..., 3).
 
@@ -130,6 +131,7 @@ def arm_torque(
         phi, phi_dot, phi_ddot: driven angles [rad], rates and accelerations, shape (..., 3) each.
         design: parameters of the robot.
         legs, h_ddot: geometry at ``phi`` and the wrist's acceleration [m/s^2], if known.
+        base_ddot: acceleration of a driving base in the arm's frame [m/s^2], shape (..., 3), which acts like gravity.
 
     Raises:
         InputError: no wrist position exists at some configuration.
@@ -137,7 +139,7 @@ def arm_torque(
     phi, phi_dot, phi_ddot = (np.asarray(a, dtype=float) for a in (phi, phi_dot, phi_ddot))
     legs = leg_geometry(phi, design) if legs is None else legs
     up = np.asarray(design.up)
-    g = design.gravity_mps2 * up
+    g = design.gravity_mps2 * up + (0.0 if base_ddot is None else base_ddot)
     h_ddot = wrist_motion(legs, phi_dot, phi_ddot)[1] if h_ddot is None else h_ddot
     knee_ddot = legs.knee_d1 * phi_ddot[..., None] + legs.knee_d2 * (phi_dot**2)[..., None]
     # Consistent mass of a slender rod: T = m/6 (va.va + va.vb + vb.vb), with half of the weight at each end.
@@ -147,6 +149,7 @@ def arm_torque(
     at_wrist = rod_mass * ((knee_ddot + 2.0 * wrist_ddot) / 6.0 + g[..., None, :] / 2.0)
     wrist_force = at_wrist.sum(axis=-2) + design.wrist_mass_kg * (h_ddot + g)
     link = design.proximal_mass_kg * design.gravity_mps2 * design.proximal_com_m
+    up = up if base_ddot is None else g / design.gravity_mps2
     link_weight = link * np.cos(phi) * up[..., 2:] - link * np.sin(phi) * (up @ LEG_DIRECTIONS.T)
     return (
         design.proximal_inertia_kgm2 * phi_ddot
@@ -185,6 +188,7 @@ def wrench_on_payload(
     gimbal: Gimbal | None = None,
     R_bi: Array | None = None,
     h_ddot: Array | None = None,
+    base_ddot: Array | None = None,
 ) -> Array:
     """Return the wrench (m_i [N m], f_i [N]) of the robot ON the payload at the origin of {i}, in {i}, shape (..., 6).
 
@@ -197,6 +201,7 @@ def wrench_on_payload(
         design: parameters of the robot.
         legs, gimbal, R_bi, h_ddot: geometry at ``phi``, gimbal and orientation at ``theta`` and the wrist's
             acceleration [m/s^2], if known.
+        base_ddot: as in ``arm_torque``.
 
     Raises:
         InputError: no wrist position exists at some configuration.
@@ -204,7 +209,7 @@ def wrench_on_payload(
     legs = leg_geometry(phi[0], design) if legs is None else legs
     gimbal = Gimbal.at(theta[0]) if gimbal is None else gimbal
     R_bi = gimbal.rotation() if R_bi is None else R_bi
-    f_b = legs.at_wrist(np.asarray(tau) - arm_torque(*phi, design, legs, h_ddot))
+    f_b = legs.at_wrist(np.asarray(tau) - arm_torque(*phi, design, legs, h_ddot, base_ddot))
     f_i = times(np.swapaxes(R_bi, -1, -2), f_b)
     m_i = -gimbal.moment(gimbal_torque(*theta, design, gimbal))
     return vectors(*components(m_i), *components(f_i))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from estimator.arm.delta import LegGeometry, jacobian_of, leg_geometry, wrist_motion
 from estimator.arm.dynamics import Gimbal, arm_torque, gimbal_torque, wrench_on_payload
 from estimator.arm.unit import AT, Arms, ArmUnit
-from estimator.arrays import Array, apart, components
+from estimator.arrays import Array, apart, components, matrices
 from estimator.so3 import cross, times
 
 
@@ -63,8 +63,9 @@ class ArmData(NamedTuple):
 
 
 def arm_data(
-    phi: tuple[Array, Array, Array], theta: tuple[Array, Array, Array], tau: Array, arm: Arms
-) -> ArmData:
+    phi: tuple[Array, Array, Array], theta: tuple[Array, Array, Array], tau: Array, arm: Arms,
+    base: Array | None = None,
+) -> ArmData:  # fmt: skip
     """Compute kinematics and dynamics of an arm (paper, equations (28)-(29), section IV.B).
 
     Args:
@@ -72,12 +73,16 @@ def arm_data(
         theta: gimbal angles (z, y, x) [rad], rates and accelerations, each (..., 3).
         tau: spring torques [N m], shape (..., 3).
         arm: parameters of the arm; their leading axes correspond to those of the angles.
+        base: pose (x, y [m], yaw [rad]) of a driving base in its {b} at the start, with rates and accelerations, shape
+            (..., 9). Pose, twist and wrench then are those of the grasp in that frame. None for a base that stands.
 
     Raises:
         InputError: no wrist position exists at some configuration.
     """
     legs = leg_geometry(phi[0], arm)
     h_dot, h_ddot = wrist_motion(legs, phi[1], phi[2])
+    if base is not None:
+        return _driven_arm(phi, theta, tau, arm, legs, (h_dot, h_ddot), base)
     gimbal = Gimbal.at(theta[0])
     R_bi = gimbal.rotation()
     R_ib = np.swapaxes(R_bi, -1, -2)
@@ -88,6 +93,44 @@ def arm_data(
     return ArmData(
         R_bi, legs.h, np.concatenate([omega, v], axis=-1), np.concatenate([omega_dot, v_dot], axis=-1), wrench
     )
+
+
+def _driven_arm(
+    phi: tuple[Array, Array, Array], theta: tuple[Array, Array, Array], tau: Array, arm: Arms,
+    legs: LegGeometry, wrist: tuple[Array, Array], base: Array,
+) -> ArmData:  # fmt: skip
+    """Return ``arm_data`` on a driving base.
+
+    The base's yaw adds to theta_z, which turns about the same vertical. Its acceleration acts on the arm like gravity;
+    of what its rotation adds, the wrist's part counts (links and rods move across it by less than 0.01 N).
+    """
+    yaw = [
+        np.stack([x, *np.zeros((2, *x.shape))], axis=-1) for x in (base[..., 2], base[..., 5], base[..., 8])
+    ]
+    theta = theta[0] + yaw[0], theta[1] + yaw[1], theta[2] + yaw[2]
+    about, faster = yaw[1][..., :1], yaw[2][..., :1]
+    S, across = yaw_matrix(base[..., 2]), np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    h_dot = wrist[0] + about * (legs.h @ across)
+    h_ddot = wrist[1] + faster * (legs.h @ across) + about * ((wrist[0] + h_dot) @ across)
+    planar = np.array([1.0, 1.0, 0.0])
+    base_dot, base_ddot = base[..., 3:6] * planar, base[..., 6:9] * planar
+    gimbal = Gimbal.at(theta[0])
+    R, R_back = gimbal.rotation(), np.swapaxes(S, -1, -2)
+    R_ib = np.swapaxes(R, -1, -2)
+    omega, omega_dot = gimbal.motion(theta[1], theta[2])
+    v = times(R_ib, times(S, h_dot) + base_dot)
+    v_dot = times(R_ib, times(S, h_ddot) + base_ddot) - cross(omega, v)
+    pushed = wrench_on_payload(
+        phi, theta, tau, arm, legs, gimbal, R_back @ R, h_ddot, times(R_back, base_ddot)
+    )
+    twist, twist_dot = np.concatenate([omega, v], axis=-1), np.concatenate([omega_dot, v_dot], axis=-1)
+    return ArmData(R, times(S, legs.h) + base[..., :3] * planar, twist, twist_dot, pushed)
+
+
+def yaw_matrix(yaw: Array) -> Array:
+    """Return rotations about z by angles [rad], shape (...) -> (..., 3, 3)."""
+    cos, sin, zero = np.cos(yaw), np.sin(yaw), np.zeros_like(yaw)
+    return matrices([[cos, -sin, zero], [sin, cos, zero], [zero, zero, zero + 1.0]])
 
 
 LENGTHS: NDArray[np.intp] = np.r_[AT["radius"], AT["proximal_length"], AT["rod_length"]]

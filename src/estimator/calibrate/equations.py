@@ -8,18 +8,30 @@ in geodesy). Without the adjustment, derivative and residual share the same nois
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from estimator.arm.delta import jacobian_of, leg_geometry, length_jacobians
 from estimator.arm.dynamics import arm_torque, rate_matrix, rotation
-from estimator.arm.motion import BY_UNIT, PHI, PHI_DDOT, PHI_DOT, STEPS, TAU, THETA, ArmChanges, ArmData
+from estimator.arm.motion import (
+    BY_UNIT,
+    PHI,
+    PHI_DDOT,
+    PHI_DOT,
+    STEPS,
+    TAU,
+    THETA,
+    ArmChanges,
+    ArmData,
+    yaw_matrix,
+)
 from estimator.arm.motion import COUNT as SLOTS
 from estimator.arm.unit import AT, COUNT, ArmUnit, true_joints
 from estimator.arrays import Array
 from estimator.calibrate import rules
+from estimator.calibrate.driven import PATHS, SCALES, STATES, Drift, Driven
 from estimator.calibrate.rows import Rows, Sensing
 from estimator.rigid_team import (
     Bases,
@@ -33,7 +45,7 @@ from estimator.rigid_team import (
     total_wrench,
     vee,
 )
-from estimator.so3 import cross
+from estimator.so3 import cross, skew, times
 
 
 def corrected(s: Array, units: ArmUnit) -> Array:
@@ -47,6 +59,8 @@ _POSE = np.r_[
     AT["phi_zero"], AT["theta_zero"], AT["radius"], AT["proximal_length"], AT["rod_length"], AT["tilt"]
 ]
 _AXES = np.eye(3)[:, :2]
+_PLANAR = [3, 4, 2]  # x, y and yaw among the errors of a base
+_JOLT, _SCALE = 1e-3, 1e-3  # steps of finite differences, by acceleration and by scale
 
 
 def pose_derivatives(rows: Rows, units: ArmUnit, shared: Shared, bases: Bases) -> tuple[Array, Array, Array]:
@@ -94,10 +108,14 @@ def _by_unit(s: Array, units: ArmUnit) -> tuple[Array, Array, Array, Array]:
     for k, part in enumerate(length_jacobians(legs, phi, units)):
         shift[..., 6 + 3 * k : 9 + 3 * k] = part
     R_ba = units.R_ba
+    if s.shape[-1] > SLOTS:
+        R_ba = yaw_matrix(s[..., SLOTS + 2]) @ R_ba
     R_bi, h = R_ba @ R_ai, (R_ba @ legs.h[..., None])[..., 0]
     turn, shift = R_ba @ turn, R_ba @ shift
     turn[..., 15:] = _AXES
     shift[..., 15:] = np.cross(_AXES.T, h[..., None, :]).swapaxes(-1, -2)
+    if s.shape[-1] > SLOTS:
+        h[..., :2] += s[..., SLOTS : SLOTS + 2]
     return R_bi, h, turn, shift
 
 
@@ -164,6 +182,7 @@ class Rowed(NamedTuple):
         covariance: of the residual noise for the fit: repeating errors do not average out, shape (n, C, C).
         scatter: of the residual noise as visible in the scatter of the rows, shape (n, C, C).
         adjustment: change of the rows' signals towards the model, shape (n, N, ``SLOTS``).
+        driven: derivatives by errors of the bases; None for bases that stand.
     """
 
     residual: Array
@@ -173,6 +192,7 @@ class Rowed(NamedTuple):
     covariance: Array
     scatter: Array
     adjustment: Array
+    driven: Driven | None = None
 
 
 class Curvature(NamedTuple):
@@ -192,6 +212,8 @@ class TrialEquations:
         shown: the same, as visible in the scatter of the rows.
         mean: averaged readings, shape (n, N, ``SLOTS``).
         held: whether to omit derivatives by the robots' lengths and masses (set to 0).
+        first: whether the rows are the first of the trial.
+        drift: standard deviations of the errors of driving bases.
     """
 
     rows: Rows
@@ -199,19 +221,33 @@ class TrialEquations:
     shown: tuple[Array, Array]
     mean: Array
     held: bool = False
+    first: bool = True
+    drift: Drift = field(default_factory=Drift)
 
     @classmethod
-    def of(cls, rows: Rows, sensing: Sensing, *, held: bool = False) -> TrialEquations:
+    def of(
+        cls,
+        rows: Rows,
+        sensing: Sensing,
+        *,
+        held: bool = False,
+        first: bool = True,
+        drift: Drift | None = None,
+    ) -> TrialEquations:
         """Make the equations of a trial from its rows and the resolution of its sensors."""
         mean = rows(rows.s)
         # Rates in a hold are noise.
         mean[rows.moving :, :, 3:9] = mean[rows.moving :, :, 12:18] = 0.0
+        mean[rows.moving :, :, SLOTS + 3 :] = 0.0
         shown = sensing.variances(replace(rows, repeats=1.0))
-        return cls(rows, sensing.variances(rows), shown, mean, held)
+        return cls(rows, sensing.variances(rows), shown, mean, held, first, drift or Drift())
 
-    def residual(self, units: ArmUnit, shared: Shared, bases: Bases) -> Array:
-        """Return the rows of the residual, shape (n, C)."""
-        data = robot_data(corrected(self.rows.s, units), units)
+    def residual(self, units: ArmUnit, shared: Shared, bases: Bases, wrong: Array | None = None) -> Array:
+        """Return the rows of the residual, shape (n, C); ``wrong`` are errors of the bases' signals, (q, N, 9)."""
+        s = corrected(self.rows.s, units)
+        if wrong is not None:
+            s[..., SLOTS:] += wrong
+        data = robot_data(s, units)
         pose = pose_error(data.R_bi, data.h, shared, bases)
         force, moment = total_wrench(data.wrench, shared.grasps)
         needed = _motion(data, units, shared).regressor(units) @ shared.pi
@@ -254,6 +290,7 @@ class TrialEquations:
         bases: Bases,
         adjustment: Array | None = None,
         curvature: Curvature | None = None,
+        wrong: tuple[Array, Array] | None = None,
     ) -> Rowed:
         """Evaluate residual, derivatives and covariances at some unknowns.
 
@@ -261,11 +298,14 @@ class TrialEquations:
             units, shared, bases: the unknowns.
             adjustment: signal adjustment from nearby unknowns; None at first.
             curvature: curvature of the balance's derivatives from nearby unknowns; None to omit it.
+            wrong: errors of driving bases from nearby unknowns, as in ``Eliminated``; None at first. The residual
+                returned is that of bases without errors, by the derivatives there.
         """
         s = corrected(self.mean, units)
         if adjustment is not None:
-            s = s + adjustment
-        residual = self.residual(units, shared, bases)
+            s[..., :SLOTS] += adjustment
+        path = None if wrong is None else self._path(*wrong)
+        residual = self.residual(units, shared, bases, path)
         by_signals, by_units = _by_robots(s, units, shared, bases, held=self.held)
         by_carried = _by_carried(robot_data(s, units), units, shared)
         by_bases = np.zeros((*residual.shape, 4 * (shared.grasps.robots - 1)))
@@ -282,8 +322,89 @@ class TrialEquations:
         covariance = scatter = covariance_of(by_signals, noise)
         if np.any(np.asarray(self.rows.repeats) > 1.0):
             scatter = covariance_of(by_signals, noise_of(self.rows, self.shown))
-        adjusted = adjustment_of(by_signals, noise, covariance, residual)
-        return Rowed(residual, by_units, by_carried, by_bases, covariance, scatter, adjusted)
+        driven = self._driven(s, units, shared, bases) if self.rows.driven else None
+        left = residual
+        if driven is not None and wrong is not None:
+            residual = residual - self._explained(driven, wrong)
+            left = (
+                residual + np.einsum("nck,nk->nc", driven.by_states, wrong[0]) + driven.by_scales @ wrong[1]
+            )
+        noisy = covariance if driven is None else driven.with_noise(covariance, self.drift)
+        adjusted = adjustment_of(by_signals, noise, noisy, left)
+        return Rowed(residual, by_units, by_carried, by_bases, covariance, scatter, adjusted, driven)
+
+    def _explained(self, driven: Driven, wrong: tuple[Array, Array]) -> Array:
+        """Return the part of the residual that errors of the bases' path explain, shape (n, C)."""
+        known = np.zeros((*self.rows.s.shape[:2], STATES))
+        known[..., _PLANAR] = self._path(wrong[0], 0.0 * wrong[1])[..., :3]
+        walked = self.rows(known).reshape(len(wrong[0]), -1)
+        path = wrong[1].reshape(-1, SCALES) * (np.arange(SCALES) < PATHS)
+        return np.einsum("nck,nk->nc", driven.by_states, walked) + driven.by_scales @ path.ravel()
+
+    @property
+    def _scaled(self) -> Array:
+        assert self.rows.scaled is not None
+        return self.rows.scaled
+
+    def _path(self, states: Array, scales: Array) -> Array:
+        """Return errors of the bases' signals at all instants, shape (q, N, 9), from those of rows and of scale."""
+        order = np.argsort(self.rows.time)
+        planar = states.reshape(len(states), -1, STATES)[..., _PLANAR]
+        at = np.arange(len(self.rows.s), dtype=float)
+        middle, out = self.rows(at)[order], np.zeros((*self.rows.s.shape[:2], 9))
+        for i, k in np.ndindex(planar.shape[1:]):
+            out[:, i, k] = np.interp(at, middle, planar[order, i, k])
+        return out + np.einsum(
+            "qnak,na->qnk", self._scaled[:, :, :PATHS], scales.reshape(-1, SCALES)[:, :PATHS]
+        )
+
+    def _driven(self, s: Array, units: ArmUnit, shared: Shared, bases: Bases) -> Driven:
+        """Return derivatives by errors of the bases at mean signals s."""
+        n, N = s.shape[:2]
+        data = robot_data(s, units)
+        motion = _motion(data, units, shared)
+        by_states, by_jolts = np.zeros((n, 6 * N, N, STATES)), np.zeros((n, 6, N, 3))
+        by_scales = np.zeros((n, 6 * N, N, SCALES))
+        here, before = self._balance(s, units, shared), self.residual(units, shared, bases)
+        for i in range(N):
+            arm = data.h[:, i] - s[:, i, SLOTS : SLOTS + 3] * [1.0, 1.0, 0.0]
+            lever = arm - [0.0, 0.0, rules.FLOOR_M]
+            turned = skew(np.eye(3))[:, None] @ data.R_bi[:, i]
+            apart = np.cross(np.eye(3)[:, None], lever)
+            R = np.concatenate([turned, np.zeros_like(turned)])
+            h = np.concatenate([apart, np.broadcast_to(np.eye(3)[:, None], apart.shape)])
+            none = np.zeros((*h.shape[:2], 6))
+            of_base = ArmData(R, h, none, none, none)
+            changed = _chain(i, of_base, data.R_bi[:, i], motion, shared, bases, units.gravity_mps2)
+            by_states[:, :, i] = np.moveaxis(changed, 0, -1)
+            ahead = s[:, i, SLOTS + 6 : SLOTS + 9] * [1.0, 1.0, 0.0]
+            load = -times(data.R_bi[:, i], data.wrench[:, i, 3:])
+            for k, tilt in enumerate((np.cross([0.0, 0.0, 1.0], ahead), cross(arm, load) * [1.0, 1.0, 0.0])):
+                by_scales[:, :, i, PATHS + k] += np.einsum("nck,nk->nc", by_states[:, :, i, :3], tilt)
+            for k in range(3):
+                jolted = s.copy()
+                jolted[:, i, SLOTS + 6 + k] += _JOLT
+                by_jolts[:, :, i, k] = (self._balance(jolted, units, shared) - here) / _JOLT
+            for k in range(PATHS + 1):
+                path = np.zeros((*self.rows.s.shape[:2], 9))
+                path[:, i] = _SCALE * self._scaled[:, i, k]
+                by_scales[:, :, i, k] = (self.residual(units, shared, bases, path) - before) / _SCALE
+            # Rocking with the acceleration moves the wrist, whose acceleration enters the balance.
+            by_scales[:, :-6, i, PATHS] = 0.0
+            by_scales[:, -6:, i, PATHS] *= lever[:, None, 2]
+        by_jolts[self.rows.moving :] = 0.0
+        order = np.argsort(self.rows.time)
+        place, moved = s[order][..., SLOTS : SLOTS + 2], np.empty((n, N, 2))
+        moved[order] = np.diff(place, axis=0, prepend=place[:1])
+        by_states, by_scales, by_jolts = (
+            x.reshape(*x.shape[:2], -1) for x in (by_states, by_scales, by_jolts)
+        )
+        return Driven(by_states, by_scales, by_jolts, moved, self.rows.time, self.first)
+
+    def _balance(self, s: Array, units: ArmUnit, shared: Shared) -> Array:
+        data = robot_data(s, units)
+        needed = _motion(data, units, shared).regressor(units) @ shared.pi
+        return np.concatenate(total_wrench(data.wrench, shared.grasps), axis=1) - needed
 
 
 class _Motion(NamedTuple):
@@ -332,10 +453,14 @@ def _by_robots(
     by_signals, by_units = np.zeros((n, 6 * N, N, SLOTS)), np.zeros((n, 6 * N, N, COUNT))
     for i in range(N):
         unit = ArmUnit(units.design, units.x[i])
-        arm = ArmChanges(s[:, i], unit)
+        arm, turn = ArmChanges(s[:, i], unit), None
+        if s.shape[-1] > SLOTS:
+            turn = yaw_matrix(s[:, i, SLOTS + 2])
         parts = [(np.arange(SLOTS), by_signals, arm.by_signals())]
         parts += [] if held else [(BY_UNIT, by_units, arm.by_unit())]
         for places, changed, d in parts:
+            if turn is not None:
+                d = d._replace(R_bi=turn @ d.R_bi, h=times(turn, d.h))
             part = _chain(i, d, data.R_bi[:, i], motion, shared, bases, units.gravity_mps2)
             changed[:, :, i, places] = np.moveaxis(part, 0, -1)
         by_units[:, :, i, AT["phi_zero"]] = -by_signals[:, :, i, PHI]

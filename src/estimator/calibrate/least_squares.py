@@ -18,6 +18,7 @@ from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.arrays import Array
 from estimator.calibrate import rules
 from estimator.calibrate.calibration import CalibratedPayload, Calibration
+from estimator.calibrate.driven import Drift, Driven, eliminated, learnt
 from estimator.calibrate.equations import AloneEquations, Curvature, Rowed, TrialEquations
 from estimator.calibrate.prior import Prior
 from estimator.calibrate.rows import Rows, Sensing
@@ -110,6 +111,22 @@ class Quadratic:
         gram = flat.T @ flat
         return cls(index, gram[:-1, :-1], gram[:-1, -1], float(gram[-1, -1]), residual.size)
 
+    @classmethod
+    def driven(
+        cls,
+        J: Array,
+        residual: Array,
+        covariance: Array,
+        index: NDArray[np.intp],
+        bases: Driven,
+        drift: Drift,
+        at: slice,
+    ) -> tuple[Quadratic, tuple[Array, Array]]:
+        """Return the same of the channels ``at`` of bases that drive, without their errors, and these errors."""
+        found = eliminated(J[:, at], residual[:, at], covariance[:, at, at], bases, drift, at)
+        H, g, c = found.gram[:-1, :-1], found.gram[:-1, -1], float(found.gram[-1, -1])
+        return cls(index, H, g, c, residual[:, at].size), (found.states, found.scales)
+
     @property
     def ratio(self) -> float:
         """chi2 over the number of rows; 0 without rows."""
@@ -157,11 +174,12 @@ class KnownMass(NamedTuple):
 
 
 class CarriedTrial(NamedTuple):
-    """Rows of a trial, the index of its payload (from 0), and the sensors of its robots."""
+    """Rows of a trial, index of its payload (from 0), sensors of its robots, errors of bases that drive."""
 
     rows: Rows
     payload: int
     sensing: Sensing
+    drift: Drift = Drift()
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,7 +277,8 @@ class Problem:
         # by no more than that, so a Gauss-Newton step would cover only a fifth of the distance. With held robots and
         # weak motion, the errors may exceed the information on the inertia. Both cases need averaged derivatives.
         self._averaged = given.prior.arm_mass_ratio > 0.0 or not self.prior.any()
-        self._use_rows(max(1, sum(len(trial.rows.time) for trial in given.trials) // rules.COARSE_ROWS))
+        coarse = max(1, sum(len(trial.rows.time) for trial in given.trials) // rules.COARSE_ROWS)
+        self._use_rows(1 if any(trial.rows.driven for trial in given.trials) else coarse)
 
     def _use_rows(self, every: int) -> None:
         self.complete = every == 1
@@ -320,7 +339,7 @@ class Problem:
         """
         H, g = self.normal(point)
         every = [block for blocks in self._blocks for block in blocks]
-        adjustments = [block.adjustment for block in every]
+        adjustments = [(block.adjustment, block.wrong) for block in every]
         for tried in range(1, most + 1):
             dz = solved(H + damping * np.diag(np.diag(H)), g)[0]
             try:
@@ -330,9 +349,22 @@ class Problem:
             if there is not None and there.value <= point.value * (1.0 + rules.RISE):
                 return there, tried, 0.0 if damping <= rules.LEAST_DAMPING else damping / rules.DAMPING
             for block, before in zip(every, adjustments, strict=True):
-                block.adjustment = before
+                block.adjustment, block.wrong = before
             damping = max(rules.LEAST_DAMPING, damping * rules.DAMPING)
         return None, most, damping
+
+    def learnt(self, point: Point) -> list[CarriedTrial]:
+        """Return the trials with the errors of driving bases that make the residual at a point most likely."""
+        out = []
+        for k, trial in enumerate(self._given.trials):
+            drift = trial.drift
+            if trial.rows.driven:
+                block, at = self._blocks[k][0], point.unknowns
+                rowed = block.at(at.units, at.carried[trial.payload], at.bases[k])
+                assert rowed.driven is not None
+                drift = learnt(rowed.residual, rowed.covariance, rowed.driven, drift)
+            out.append(trial._replace(drift=drift))
+        return out
 
     def _trial(self, k: int, at: Unknowns, *, split: bool) -> TrialFit:
         """Evaluate one trial; separate loops and balance only if ``split``."""
@@ -348,7 +380,13 @@ class Problem:
             kinds = (slice(0, C), slice(0, C - 6), slice(C - 6, C))
             for kind, rows in enumerate(kinds if split else kinds[:1]):
                 noise = rowed.scatter if kind else rowed.covariance
-                part = Quadratic.of(J[:, rows], rowed.residual[:, rows], noise[:, rows, rows], index)
+                if rowed.driven is None:
+                    part = Quadratic.of(J[:, rows], rowed.residual[:, rows], noise[:, rows, rows], index)
+                else:
+                    drift = block.equations.drift
+                    noise = rowed.driven.with_noise(noise, drift)
+                    part, wrong = Quadratic.driven(J, rowed.residual, noise, index, rowed.driven, drift, rows)
+                    block.wrong = block.wrong if kind else wrong
                 before = sums[kind]
                 sums[kind] = part if before is None else before.plus(part)
         total = sums[0]
@@ -363,7 +401,7 @@ class Problem:
 
 @dataclass(eq=False)
 class _Block:
-    """Rows of a trial, with state from earlier steps: signal adjustment and curvature of the derivatives.
+    """Rows of a trial, with state from earlier steps: adjustment of signals, curvature, errors of driving bases.
 
     If ``averaged``, derivatives of the balance are averaged over each row.
     """
@@ -372,12 +410,13 @@ class _Block:
     averaged: bool
     adjustment: Array | None = None
     curvature: Curvature | None = None
+    wrong: tuple[Array, Array] | None = None
 
     def at(self, units: ArmUnit, shared: Shared, bases: Bases) -> Rowed:
         """Evaluate the rows at some unknowns, and keep adjustment and curvature."""
         if self.averaged:
             self.curvature = self.equations.curvature(units, shared, bases, self.curvature)
-        rowed = self.equations.at(units, shared, bases, self.adjustment, self.curvature)
+        rowed = self.equations.at(units, shared, bases, self.adjustment, self.curvature, self.wrong)
         self.adjustment = rowed.adjustment
         return rowed
 
@@ -385,8 +424,15 @@ class _Block:
 def _equations(trial: CarriedTrial, every: int, *, held: bool) -> list[TrialEquations]:
     """Return equations of one row in ``every``, in blocks; held robots need no derivatives."""
     chosen = np.arange(0, len(trial.rows.time), every)
+    if trial.rows.driven:
+        chosen = chosen[np.argsort(trial.rows.time[chosen])]
     parts = np.array_split(chosen, max(1, -(-len(chosen) // rules.BLOCK_ROWS)))
-    return [TrialEquations.of(trial.rows.take(part), trial.sensing, held=held) for part in parts]
+    return [
+        TrialEquations.of(
+            trial.rows.take(np.sort(part)), trial.sensing, held=held, first=k == 0, drift=trial.drift
+        )
+        for k, part in enumerate(parts)
+    ]
 
 
 def _alone(equations: AloneEquations, units: ArmUnit) -> Quadratic:
@@ -434,8 +480,8 @@ class Fit:
         return CalibratedPayload(label, grasps, shared.pi, covariance, self.by_scale[of])
 
 
-def fit(given: Given) -> Fit:
-    """Minimize the sum of squares of a calibration.
+def fit(given: Given, learn: int = 1) -> Fit:
+    """Minimize the sum of squares of a calibration; learn the errors of driving bases so many times.
 
     Raises:
         InputError, LinAlgError: arms cannot reach their recorded poses, or the equations are singular.
@@ -465,6 +511,11 @@ def fit(given: Given) -> Fit:
             break
         if flat:
             point = problem.on_all_rows(point, np.zeros(len(point.z)))
+
+    if learn and any(trial.rows.driven for trial in given.trials):
+        at = point.unknowns
+        start = Unknowns(given.start.units, at.carried, at.bases)
+        return fit(replace(given, trials=problem.learnt(point), start=start), learn - 1)
 
     def followed(held: Array) -> Array:
         """Return changes of all unknowns per change of a held quantity, shape (K, ...)."""

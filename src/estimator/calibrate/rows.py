@@ -24,7 +24,7 @@ class Rows:
     """Thinned signals of one trial, and the linear map from them to rows.
 
     Attributes:
-        s: filtered readings with rates and accelerations, shape (q, N, 21).
+        s: filtered readings with rates and accelerations, shape (q, N, 21); (q, N, 30) with those of driving bases.
         operator: matrix from the q instants to rows, shape (n, q); rows in motion first.
         time: middle of every row [s], shape (n,).
         moving: number of rows in motion.
@@ -34,7 +34,14 @@ class Rows:
         travel: path of each driven and gimbal joint during a row [rad], shape (n, N, 6).
         rate_hz: sampling rate.
         repeats: number of times that the same rounding errors occur in a periodic motion, shape (N, 9) or 1.
+        scaled: of driving bases, change of pose, rate and acceleration by errors of scale of the odometry (yaw, x, y),
+            and by a displacement in proportion to acceleration, shape (q, N, 4, 9); None for bases that stand.
     """
+
+    @property
+    def driven(self) -> bool:
+        """Whether the bases drive."""
+        return self.scaled is not None
 
     s: Array
     operator: csr_array
@@ -45,6 +52,7 @@ class Rows:
     travel: Array
     rate_hz: float
     repeats: Array | float
+    scaled: Array | None = None
 
     def __call__(self, x: Array) -> Array:
         """Average samples into rows, shape (q, ...) -> (n, ...)."""
@@ -57,6 +65,7 @@ class Rows:
         return replace(
             self,
             s=self.s[needed],
+            scaled=None if self.scaled is None else self.scaled[needed],
             operator=csr_array(operator[:, needed]),
             time=self.time[chosen],
             moving=int(np.sum(chosen < self.moving)),
@@ -77,12 +86,18 @@ class Rows:
             for k, part in enumerate((value, speed, differentiate(speed, rate))):
                 s[..., first + 3 * k : first + 3 * k + 3] = part
         s[..., 18:] = low_pass(recording.tau, rate, cutoff)
+        scaled, joints = None, angles
+        if recording.base is not None:
+            base = with_rates(low_pass(recording.base, rate, cutoff), rate)
+            s, scaled = np.concatenate([s, base], axis=2), with_rates(scaled_paths(base, rate), rate)
+            joints = np.concatenate([angles, recording.base], axis=2)
 
         stride = max(1, round(rate / rules.SAMPLE_HZ))
-        kernel, spacing = _kernel(rate / stride)
+        row_s = rules.ROW_S if recording.base is None else rules.DRIVEN_ROW_S
+        kernel, spacing = _kernel(rate / stride, row_s)
         half = len(kernel) // 2
         trim = round(rules.TRIM_S * rate)
-        holds, still = _holds(angles, rate, trim)
+        holds, still = _holds(joints, rate, trim)
         at = np.arange(0, len(angles), stride)
         first, last = max(-(-trim // stride), half), min((len(angles) - trim) // stride, len(at) - half)
         rows: list[tuple[NDArray[np.intp], Array]] = []
@@ -116,7 +131,7 @@ class Rows:
         weights = abs(operator)
         travel = weights @ speeds.reshape(len(at), -1) / np.maximum(weights.sum(axis=1), 1e-300)[:, None]
         travel = np.asarray(travel).reshape(len(rows), -1, 6)
-        span = np.where(np.array(length) > 0, count * stride / rate, rules.ROW_S)
+        span = np.where(np.array(length) > 0, count * stride / rate, row_s)
         return cls(
             thin,
             operator,
@@ -126,8 +141,26 @@ class Rows:
             np.array(length, dtype=np.intp),
             travel * span[:, None, None],
             rate,
-            _repeats(angles[trim : len(angles) - trim][~still[trim : len(angles) - trim]], rate),
+            scaled=None if scaled is None else scaled[at],
+            repeats=_repeats(angles[trim : len(angles) - trim][~still[trim : len(angles) - trim]], rate),
         )
+
+
+def with_rates(pose: Array, rate_hz: float) -> Array:
+    """Append rates and accelerations, shape (Q, ..., 3) -> (Q, ..., 9)."""
+    speed = differentiate(pose, rate_hz)
+    return np.concatenate([pose, speed, differentiate(speed, rate_hz)], axis=-1)
+
+
+def scaled_paths(base: Array, rate_hz: float) -> Array:
+    """Return the change of poses (Q, N, 9) by ``Rows.scaled``, shape (Q, N, 4, 3)."""
+    (x_dot, y_dot, turn), yaw = np.moveaxis(base[..., 3:6], -1, 0), base[..., 2]
+    cos, sin, turned = np.cos(yaw), np.sin(yaw), yaw - yaw[0]
+    along, across, none = cos * x_dot + sin * y_dot, cos * y_dot - sin * x_dot, np.zeros_like(yaw)
+    rows = [[-turned * y_dot, turned * x_dot, turn]]
+    rows += [[cos * along, sin * along, none], [-sin * across, cos * across, none]]
+    path = np.cumsum(np.moveaxis(np.array(rows), (0, 1), (2, 3)), axis=0) / rate_hz
+    return np.concatenate([path, base[:, :, None, 6:9] * [1.0, 1.0, 0.0]], axis=2)
 
 
 def _repeats(angles: Array, rate_hz: float) -> Array | float:
@@ -154,7 +187,7 @@ def _repeats(angles: Array, rate_hz: float) -> Array | float:
     return np.concatenate([again, again[:, :3]], axis=1)
 
 
-def _kernel(rate_hz: float) -> tuple[Array, int]:
+def _kernel(rate_hz: float, row_s: float) -> tuple[Array, int]:
     """Return the weights of a row in motion, with sum 1, and the number of instants between rows.
 
     The kernel is a root-raised-cosine (the square root of Nyquist's criterion: H. Nyquist, Certain Topics in Telegraph
@@ -162,7 +195,7 @@ def _kernel(rate_hz: float) -> tuple[Array, int]:
     for slowly varying quantities. With a windowed sinc, neighbouring rows correlate by an eighth, and the claimed
     precision is a seventh too high.
     """
-    spacing, b = max(1, round(rules.ROW_S * rate_hz)), rules.ROLL_OFF
+    spacing, b = max(1, round(row_s * rate_hz)), rules.ROLL_OFF
     half = rules.LOBES * spacing
     # The offset of 1e-6 avoids the removable singularities at 0 and 1 / (4 b).
     x = np.arange(-half, half + 1) / spacing + 1e-6

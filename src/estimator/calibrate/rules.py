@@ -10,6 +10,9 @@ SAMPLE_HZ = 33.0
 ROW_S = 0.25
 """Time between rows. Measured: acceleration noise grows with frequency, so shorter rows bias the spring scales (by one
 standard error at 0.12 s)."""
+DRIVEN_ROW_S = 0.6
+"""Time between rows of bases that drive. Measured: rollers of the wheels make bases rock at 2 to 5 Hz, in phase with
+their acceleration; with rows of 0.25 s the moment of inertia about the vertical is four standard errors too large."""
 LOBES = 3
 """Half length of the row kernel, in rows. Chosen: the residuals of neighbouring rows under white noise then correlate
 by 0.013."""
@@ -86,3 +89,17 @@ SUFFICES = 0.99
 """Share of a misfit that a change in one recording must explain to be reported, if it does not explain all of it.
 Measured: slips of 0.2 to 1 deg explain 0.9999 and more by derivatives. If a joint rubs in all recordings, the best
 change explains 0.07."""
+ODOMETRY_RATIO = 0.01
+"""Standard deviation of the relative errors of a driving base's odometry, in yaw, x and y. Chosen: tolerance of wheels.
+"""
+ROCKS = 2e-4, 2e-5
+"""Standard deviations of how a base rocks: tilt by its acceleration [rad s^2/m] and by the moment of its load
+[rad/(N m)]. Chosen: wheels of 0.7 MN/m under 40 kg, half a metre apart."""
+FLOOR_M = -0.46
+"""Height of the floor, on which a base rocks, in {b} [m]. Derived: models/omnid/omnid.xml."""
+ROCKING_S = 0.5
+"""Time in which a base forgets how it rocks on its wheels. Chosen: that of commanded motion, which moves the load."""
+LOST = 0.1
+"""Standard deviation of a base's error [m, rad] at the start of rows that follow others of the same trial. Chosen."""
+DRIFT_LOG = 2.0
+"""Standard deviation of the logarithms of what is learnt of the bases' errors. Chosen."""

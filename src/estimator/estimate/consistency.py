@@ -44,7 +44,8 @@ class Trial:
     Attributes:
         name: name in messages.
         kind, payload: ``"random"``, ``"periodic"`` or ``"static"``; label of the payload, or None.
-        steps: rounding steps of its channels, or None to skip the check for contradictions between robots.
+        steps: rounding steps of its channels, or None to skip the check for contradictions between robots,
+            as with driving bases, whose odometry is wrong by more than encoders are.
         team: number of robots that carried the payload, according to the metadata.
         units: the robots with their deviations, or None for robots as designed.
     """

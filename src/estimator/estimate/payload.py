@@ -135,7 +135,7 @@ def within_arithmetic(names: Sequence[str]) -> Iterator[None]:
 def trial_of(recording: Recording, cutoff_hz: float = 5.0) -> Trial:
     """Process a recording for ``estimate_from_trials``; arguments and errors as for ``estimate_payload``."""
     check_carries(recording, "estimated")
-    labels, steps = recording.metadata, steps_of(recording, cutoff_hz)
+    labels, steps = recording.metadata, steps_of(recording, cutoff_hz) if recording.base is None else None
     recording, held, doubt = without_held(recording)
     data = process_recording(recording, cutoff_hz, TRIM_S)
     if held:

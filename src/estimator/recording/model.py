@@ -12,15 +12,25 @@ from estimator.recording.metadata import Level, RecordingMetadata
 
 # Column suffixes in array order: one (Q, N, 3) array per field.
 _THETA, _REF = ("theta_z", "theta_y", "theta_x"), ("ref_x", "ref_y", "ref_z")
+_BASE = ("base_x", "base_y", "base_yaw")
 CHANNELS: dict[Level, dict[str, tuple[str, ...]]] = {
-    "joint": {"phi": ("phi1", "phi2", "phi3"), "theta": _THETA, "tau": ("tau1", "tau2", "tau3"), "ref": _REF},
+    "joint": {
+        "phi": ("phi1", "phi2", "phi3"),
+        "theta": _THETA,
+        "tau": ("tau1", "tau2", "tau3"),
+        "ref": _REF,
+        "base": _BASE,
+    },
     "wrist": {
         "h": ("h_x", "h_y", "h_z"),
         "theta": _THETA,
         "force": ("force_x", "force_y", "force_z"),
         "ref": _REF,
+        "base": _BASE,
     },
 }
+OPTIONAL = ("ref", "base")
+"""Fields that a recording has for all robots or for none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +47,8 @@ class Recording:
         ref: commanded wrist positions in each robot's {b} [m], shape (Q, N, 3), or None.
         metadata: metadata of the recording.
         name: name in messages, such as the file's name.
+        base: measured planar pose (x, y [m], yaw [rad]) of each robot's {b} since the start, in its {b} at the start,
+            by wheel odometry, shape (Q, N, 3), or None for bases that stand.
 
     Raises:
         InputError: the arrays' shapes do not agree with each other or with ``metadata.robots``.
@@ -49,13 +61,14 @@ class Recording:
     ref: Array | None
     metadata: RecordingMetadata
     name: str = "recording"
+    base: Array | None = None
 
     def __post_init__(self) -> None:
         """Convert the arrays to float64 and check their shapes."""
         shape = (np.size(self.time), self.metadata.robots, 3)
         for field in ("time", *CHANNELS["joint"]):
             value = getattr(self, field)
-            if value is None and field == "ref":
+            if value is None and field in OPTIONAL:
                 continue
             array = np.asarray(value, dtype=float)
             expected = shape[:1] if field == "time" else shape
@@ -73,7 +86,7 @@ class Recording:
 
     def columns(self) -> dict[str, Array]:
         """Return driven angles, gimbal angles, torques and commands by column name, each of shape (Q,)."""
-        return self._named("joint", {"phi": self.phi, "theta": self.theta, "tau": self.tau, "ref": self.ref})
+        return self._named("joint", {"phi": self.phi, "tau": self.tau})
 
     def file_columns(self) -> dict[str, Array]:
         """Return every column of the file by name, in file order, each of shape (Q,).
@@ -93,10 +106,11 @@ class Recording:
             except InputError as error:
                 raise InputError(f"{self.name}: omnid{robot + 1}: {error}") from error
             h[:, robot], force[:, robot] = converted
-        return self._named("wrist", {"h": h, "theta": self.theta, "force": force, "ref": self.ref})
+        return self._named("wrist", {"h": h, "force": force})
 
     def _named(self, level: Level, fields: dict[str, Array | None]) -> dict[str, Array]:
         columns = {"time": self.time}
+        fields = fields | {"theta": self.theta, "ref": self.ref, "base": self.base}
         for robot in range(self.metadata.robots):
             for field, suffixes in CHANNELS[level].items():
                 if (array := fields[field]) is not None:

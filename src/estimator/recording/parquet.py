@@ -17,7 +17,7 @@ from estimator.files import whole_file
 from estimator.inputs import Unpacked
 from estimator.recording.checks import check_finite, check_recording
 from estimator.recording.metadata import RecordingMetadata
-from estimator.recording.model import CHANNELS, Recording
+from estimator.recording.model import CHANNELS, OPTIONAL, Recording
 
 METADATA_KEY = b"mocobot"
 
@@ -150,11 +150,11 @@ def _check_column_names(names: list[str], metadata: RecordingMetadata, path: Pat
         spelled = range(1, min(robots, len(names)) + 1)
         return [f"omnid{i}.{s}" for i in spelled for field in fields for s in channels[field]]
 
-    required = ["time", *of_robots(*(field for field in channels if field != "ref"))]
-    optional = of_robots("ref")
-    valid = {*required, *optional}
-    if any(name in optional for name in names):
-        required += optional
+    required = ["time", *of_robots(*(field for field in channels if field not in OPTIONAL))]
+    valid = {*required, *of_robots(*OPTIONAL)}
+    for optional in (of_robots(field) for field in OPTIONAL):
+        if any(name in optional for name in names):
+            required += optional
     suffixes = ", ".join(s for group in channels.values() for s in group)
     of_level = f" at {metadata.level} level" if metadata.level != "joint" else ""
     rule = f"the columns{of_level} are time and, for i = 1..{robots}, omnid{{i}}. followed by {suffixes}"
@@ -167,7 +167,9 @@ def _check_column_names(names: list[str], metadata: RecordingMetadata, path: Pat
             raise InputError(f"{path}: column {name!r} appears {names.count(name)} times; {rule}")
     for name in required:
         if name not in names:
-            raise InputError(f"{path}: missing column {name!r}; {rule} (ref_* for all robots or for none)")
+            raise InputError(
+                f"{path}: missing column {name!r}; {rule} (ref_* and base_* for all robots or for none)"
+            )
 
 
 def _check_type(field: pa.Field, path: Path) -> None:

@@ -19,7 +19,7 @@ from mocobot_sim.effects.catalogue import parse_effect
 from mocobot_sim.extended.extended import load_extended
 from mocobot_sim.scene.as_built import read_units
 from mocobot_sim.trial.sensors import sensor_preset
-from mocobot_sim.trial.simulate import TrialRequest
+from mocobot_sim.trial.simulate import DRIVEN, TrialRequest
 from mocobot_sim.trial.simulate import simulate as simulate_request
 from mocobot_sim.trial.trial_log import TrialLog
 from mocobot_sim.trial.truth import GroundTruth, write_truth
@@ -137,7 +137,8 @@ def _simulated(
     for k, kind in enumerate(trajectories):
         number = first + list(trajectories[:k]).count(kind)
         robots = chosen.robots if kind == FREE else None
-        given = {"vias": chosen.vias, "duration_s": chosen.duration_s, "robots": robots}
+        drive = chosen.drive if kind in DRIVEN else None
+        given = {"drive": drive, "vias": chosen.vias, "duration_s": chosen.duration_s, "robots": robots}
         request = replace(
             TrialRequest(label, kind, chosen.seed, number),
             **{name: value for name, value in given.items() if value is not None},

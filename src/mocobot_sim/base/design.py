@@ -140,6 +140,11 @@ class MecanumKinematics:
         matrix = np.stack([across * x - y, np.ones(4), across], axis=1) / design.wheel_radius_m
         return cls(matrix, np.asarray(np.linalg.pinv(matrix), dtype=np.float64))
 
+    def off_by(self, ratio: ArrayLike) -> MecanumKinematics:
+        """Kinematics that take a twist (w_z, v_x, v_y) for one larger by these ratios, shape (3,)."""
+        share = 1.0 + np.asarray(ratio, dtype=float)
+        return MecanumKinematics(self.matrix / share, share[:, None] * self.inverse)
+
     def wheel_speeds(self, twist: ArrayLike) -> Array:
         """Speeds [rad/s], shape (..., 4), for twists (w_z [rad/s], v_x, v_y [m/s]), shape (..., 3)."""
         return np.asarray(twist, dtype=float) @ self.matrix.T

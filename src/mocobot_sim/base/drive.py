@@ -28,10 +28,10 @@ from mocobot_sim.scene.as_built import AsBuilt, units_of
 from mocobot_sim.scene.models import models_dir, omnid_design
 from mocobot_sim.scene.omnid import load_omnid, release, rough_floor, stand
 from mocobot_sim.scene.pymjcf import compiled, mjcf
-from mocobot_sim.scene.scene import TIMESTEP_S
+from mocobot_sim.scene.scene import TIMESTEP_S, TeamScene
 from mocobot_sim.scene.team_index import BaseIndex
 from mocobot_sim.trial.actors import Stage
-from mocobot_sim.trial.trajectories import RATE_HZ, PlanarMotion, moved, wrapped, yaw_of
+from mocobot_sim.trial.trajectories import RATE_HZ, Leg, PlanarMotion, carried, moved, plan, wrapped, yaw_of
 
 
 class WheelContacts:
@@ -94,6 +94,7 @@ class DriveLog:
         slip: sliding velocity of every wheel's contact along the roller's axle [m/s], shape (Q, N, 4).
         load: normal force of every wheel [N], shape (Q, N, 4).
         grip: friction force of every wheel [N], shape (Q, N, 4).
+        angle: wheel angles [rad], shape (Q, N, 4).
     """
 
     time: Array
@@ -106,6 +107,7 @@ class DriveLog:
     slip: Array
     load: Array
     grip: Array
+    angle: Array
 
 
 class BaseDrive:
@@ -113,7 +115,8 @@ class BaseDrive:
 
     Args:
         motion: plan of every base at the control rate; the last pose is held.
-        kinematics: wheel kinematics that the controller uses; None for ``MecanumKinematics.with_rollers``.
+        kinematics: wheel kinematics that the controllers use, one for all bases or one for each; None for
+            ``MecanumKinematics.with_rollers``.
         design: design of the bases; None for the shipped one.
         position_gain_per_s: gain k [1/s].
     """
@@ -121,12 +124,16 @@ class BaseDrive:
     def __init__(
         self,
         motion: PlanarMotion,
-        kinematics: MecanumKinematics | None = None,
+        kinematics: MecanumKinematics | Sequence[MecanumKinematics] | None = None,
         design: BaseDesign | None = None,
         position_gain_per_s: float = POSITION_GAIN_PER_S,
     ) -> None:
         self._design = design or base_design()
-        self._kinematics = kinematics or MecanumKinematics.with_rollers(self._design)
+        of_all = kinematics or MecanumKinematics.with_rollers(self._design)
+        bases = motion.pose.shape[1]
+        self._kinematics = (of_all,) * bases if isinstance(of_all, MecanumKinematics) else tuple(of_all)
+        self._matrix = np.stack([of.matrix for of in self._kinematics])
+        self._inverse = np.stack([of.inverse for of in self._kinematics])
         self._motion = motion
         self._gain = position_gain_per_s
 
@@ -171,13 +178,13 @@ class BaseDrive:
         pose, twist = self._planned(tick)
         self._update(
             data.qpos, data.qvel, data.ctrl, index.wheel_qpos, index.wheel_dof, index.drive,
-            self._kinematics.matrix, self._kinematics.inverse, self._constants,
+            self._matrix, self._inverse, self._constants,
             pose, twist, self._odometry, self._angle, self._lag, self._speed,
         )  # fmt: skip
         if tick % self._ticks == 0:
             moved = pose.copy(), self._odometry.copy(), index.poses(data), self._speed.copy()
             wheels = data.qvel[index.wheel_dof], data.ctrl[index.drive], *self._contacts.measure()
-            self._rows.append((*moved, *wheels))
+            self._rows.append((*moved, *wheels, data.qpos[index.wheel_qpos]))
 
     def _planned(self, tick: int) -> tuple[Array, Array]:
         """Planned poses and twists at a tick, shapes (N, 3)."""
@@ -191,6 +198,51 @@ class BaseDrive:
         columns[2][..., 2] = np.unwrap(columns[2][..., 2], axis=0)
         time = np.arange(len(self._rows)) * self._ticks / self._rate_hz
         return DriveLog(time, *columns)
+
+    def measured(self, encoder_bits: int | None, rng: np.random.Generator) -> Array:
+        """Odometry of a recording: integrate wheel encoders, as the controllers do, at the rate of the log.
+
+        Args:
+            encoder_bits: resolution of the wheels' encoders in bits per turn; None for no rounding.
+            rng: generator of the offset of each encoder's grid.
+
+        Returns:
+            Poses (x, y [m], yaw [rad]) of every base in its frame at the start, shape (Q, N, 3).
+        """
+        angle = np.array([row[-1] for row in self._rows])
+        if encoder_bits:
+            step = 2.0 * np.pi / 2**encoder_bits
+            grid = rng.uniform(-0.5, 0.5, angle.shape[1:])
+            angle = step * np.round(angle / step + grid)
+        steps = np.einsum("nak,qnk->qna", self._inverse, np.diff(angle, axis=0))
+        pose = np.zeros((len(angle), angle.shape[1], 3))
+        for k, step in enumerate(steps):
+            pose[k + 1] = moved(pose[k], step)
+        return pose
+
+
+REACH_M, TURN_RAD, LEG_S, REST_S = 0.3, 0.3, 4.0, 0.5
+"""Range of a wandering team about its start, in x and y and in yaw, and duration of a leg and of the rest after it.
+Chosen: legs of the speed of ``scenarios/carry_sideways.py``."""
+
+
+def wandering(scene: TeamScene, duration_s: float, ratio: float, rng: np.random.Generator) -> BaseDrive:
+    """Drive released bases along random legs under the payload, each by odometry with errors of scale.
+
+    Args:
+        scene: team with released bases.
+        duration_s: duration of the trial [s]; bases rest in its first and last second.
+        ratio: standard deviation of the relative errors of each base's odometry, in yaw, x and y.
+        rng: generator of legs and errors.
+    """
+    place = np.column_stack([scene.mounts.translation[:, :2], yaw_of(scene.mounts.rotation.as_matrix())])
+    middle = np.append(scene.X_1i.translation[:, :2].mean(axis=0), 0.0)
+    count = max(1, int((duration_s - 2.0) / (LEG_S + REST_S)))
+    away = rng.uniform(-1.0, 1.0, (count, 3)) * [REACH_M, REACH_M, TURN_RAD]
+    legs = [Leg((x, y, yaw), LEG_S, REST_S) for x, y, yaw in (middle + away).tolist()]
+    true = MecanumKinematics.with_rollers(base_design())
+    kinematics = [true.off_by(off) for off in ratio * rng.standard_normal((scene.robots, 3))]
+    return BaseDrive(carried(plan(middle, legs, rest_s=1.0), place), kinematics)
 
 
 class FollowingDrive(BaseDrive):

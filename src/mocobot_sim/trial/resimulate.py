@@ -40,6 +40,10 @@ def resimulate(
         TrialError: the simulation failed a check.
     """
     meta = recording.metadata
+    if recording.base is not None:
+        raise InputError(
+            f"{recording.name}: is of driving bases; only trials of standing ones are resimulated"
+        )
     if recording.ref is None:
         raise InputError(
             f"{recording.name}: has no commands (ref_x, ref_y, ref_z); resimulating it needs them"

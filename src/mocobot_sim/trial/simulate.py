@@ -20,6 +20,7 @@ from mocobot_sim.scene.payload import grasp_frames, load_payload
 from mocobot_sim.scene.scene import TeamScene, build_free_team, build_team, check_robots
 from mocobot_sim.trial.sensors import PRESETS, SensorPreset, measure
 from mocobot_sim.trial.trajectories import (
+    RATE_HZ,
     Trajectory,
     free_motion,
     random_vias,
@@ -30,6 +31,8 @@ from mocobot_sim.trial.trial import run_trial
 from mocobot_sim.trial.trial_log import TrialLog
 from mocobot_sim.trial.truth import GroundTruth
 
+DRIVEN = ("random", "periodic")
+"""Kinds of trial in which bases may drive."""
 LEFT_RAD = 0.3
 """Largest initial angle of a gimbal without payload [rad]. Chosen."""
 
@@ -46,6 +49,7 @@ class TrialRequest:
     vias: int = 80  # number of vias of a random trial, or of the fast part of a free trial
     duration_s: float = 60.0  # length of a periodic trial's motion [s]
     robots: int | None = None  # number of robots of a free trial; None for the payload's number of grasps
+    drive: float | None = None  # relative errors of the odometry of driving bases; None for bases that stand
 
     @property
     def label(self) -> str:
@@ -111,17 +115,28 @@ def simulate(
     if free:
         scene = _free_team(request, presets[0], units)
     elif scene is None:
-        scene = build_team(request.payload, units or draw_units(request.payload, presets[0], request.seed))
+        units = units or draw_units(request.payload, presets[0], request.seed)
+        scene = build_team(request.payload, units, released=request.drive is not None)
     if effects:
         scene = apply_effects(scene, effects)
     trajectory = make_trajectory(request, scene, grasps)
     number = request.number + 1 if place is None else place
-    log = run_trial(scene, trajectory, gains, progress, trial_number=number)
+    drive = None
+    if request.drive is not None:
+        from mocobot_sim.base.drive import wandering  # imports this package
+
+        seconds = (len(trajectory.ref_b) - 1) / RATE_HZ
+        drive = wandering(scene, seconds, request.drive, request.rng("drive"))
+    actors = () if drive is None else (drive,)
+    log = run_trial(scene, trajectory, gains, progress, trial_number=number, actors=actors)
     label, recordings = f"{request.label}_{request.trial}{request.number}", {}
     for preset in presets:
         rng, name = request.rng(f"sensors {preset.name}"), f"{label}_{preset.name}"
         payload = None if free else request.label
-        recordings[preset.name] = measure(log, preset, rng, payload, request.seed, name)
+        measured = measure(log, preset, rng, payload, request.seed, name)
+        if drive is not None:
+            measured = replace(measured, base=drive.measured(preset.encoder_bits, rng))
+        recordings[preset.name] = measured
     return Simulated(recordings, log, scene)
 
 
@@ -141,6 +156,10 @@ def _check(
     free = request.trial == FREE
     if free and scene is not None:
         raise InputError("a model carries a payload; robots of a free trial hold nothing")
+    if request.drive is not None and (request.trial not in DRIVEN or scene is not None):
+        raise InputError(
+            f"bases drive in {' and '.join(DRIVEN)} trials of a payload, without a model; this one is {request.trial}"
+        )
     if request.robots is not None and not free:
         raise InputError(f"robots is for a free trial; a {request.trial} one has a robot for each grasp")
     if (scene is not None or units) and not presets[0].calibrated:

@@ -27,6 +27,7 @@ from discrepancy.joints.model import SerialModel, load_model
 from discrepancy.joints.problem import Given, JointProblem, joint_problem
 from discrepancy.joints.rolled import LoggedTorques, Robot
 from discrepancy.joints.signals import Signals
+from estimator.errors import InputError
 from mocobot_logs.joints.joint_log import Drive, JointLog
 from mocobot_sim.serial.effects import ActingLaw, JointLaw
 from mocobot_sim.serial.extended import load_effects, step
@@ -172,6 +173,7 @@ def typical(case: Case, joint: str) -> tuple[float, float, float]:
 
 
 E, R = NAMES.index("elbow"), NAMES.index("rail")
+SHARE = 0.1
 TORQUES: dict[str, tuple[str, str, dict[str, float], Truth]] = {
     "friction": ("friction", "elbow", {},
                  lambda m: 0.4 * np.sign(m.v[:, E]) + 0.2 * m.v[:, E]),
@@ -286,6 +288,13 @@ def test_a_spring(change: Change, case: Case, tmp_path: Path) -> None:
     joint = "elbow" if change is spring else "rail"
     torque, hidden = truth_of(case, change)
     agrees(case, fitted(case, ("spring", joint), {}, hidden), torque, hidden, tmp_path)
+
+
+def test_a_spring_that_pushes_away(case: Case, tmp_path: Path) -> None:
+    hidden = at("elbow", lambda m: -1.0 * (m.q[:, E] - 0.2))(case.motion)
+    found = fitted(case, ("spring", "elbow"), {}, hidden)
+    assert found.members[0].values["stiffness_Nm_per_rad"] == pytest.approx(-1.0, rel=0.01)
+    agrees(case, found, case.motion.asked + hidden, hidden, tmp_path)
 
 
 def heavier(spec: mujoco.MjSpec) -> None:
@@ -451,6 +460,20 @@ def test_a_kind_is_one_effect_a_member(case: Case) -> None:
     ]
 
 
+def test_a_link_that_is_named_as_the_joint_of_another(tmp_path: Path) -> None:
+    path = tmp_path / "robot.xml"
+    inertial = '<inertial pos="0 0 0.1" mass="{}" diaginertia="0.01 0.01 0.01"/>'
+    path.write_text(
+        f'<mujoco><worldbody><body name="a"><joint name="b"/>{inertial.format(1)}<body name="b"><joint name="a"/>'
+        f"{inertial.format(2)}</body></body></worldbody></mujoco>"
+    )
+    heavy = Finding("link_mass", "b", 1, (Member("b", 1, {"excess_kg": 0.5}, {}),), 0.99, 50.0, 0.0, 0.0)
+    made = SimpleNamespace(model=load_model(path), findings=(heavy,), trials=("log",), reference=())
+    write_extended(made, tmp_path / "extended")  # type: ignore[arg-type]
+    extended = mujoco.MjModel.from_xml_path(str(tmp_path / "extended" / "robot.xml"))
+    assert (extended.body("a").mass[0], extended.body("b").mass[0]) == (1.0, 2.5)
+
+
 def test_gravity_is_compensated_with_the_payload_in_it(case: Case, tmp_path: Path) -> None:
     def change(spec: mujoco.MjSpec) -> None:
         load(spec)
@@ -494,3 +517,10 @@ def test_a_law_is_written_and_stepped(tmp_path: Path) -> None:
     data.time, data.qvel[E] = 16.0, 0.5
     step(model, data, [acting], np.zeros(4))
     np.testing.assert_allclose(data.qfrc_applied, [0.0, 0.0, 0.5 * (1.0 - np.exp(-2.0)), 0.0], atol=1e-9)
+
+
+def test_a_folder_of_an_earlier_release_is_refused(tmp_path: Path) -> None:
+    old = {"format": "mocobot-extended-robot", "version": 2, "causes": [], "recordings": []}
+    (tmp_path / "effects.json").write_text(json.dumps(old))
+    with pytest.raises(InputError, match=r"effects\.json: version is 2; it must be 3: diagnose again"):
+        load_effects(tmp_path)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from discrepancy.evidence.search import Chosen, Search, floor_of
-from discrepancy.joints.diagnose import Outcome, labels_of
+from discrepancy.joints.diagnose import Outcome, Until, labels_of
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.problem import Given, joint_problem
 from discrepancy.joints.trials import trials_of
@@ -79,6 +79,13 @@ def test_a_search_ends_after_some_seconds(bare: SerialModel, log: JointLog) -> N
     assert judged(bare, [log]).finished
 
 
+def test_time_is_up_for_good() -> None:
+    until = Until(end_s=0.0)
+    assert until()
+    assert until.broken
+    assert not Until()()
+
+
 # --- a reference
 
 
@@ -132,6 +139,12 @@ def test_a_single_log_is_three_parts_that_predict_each_other(bare: SerialModel, 
         assert np.all(one.after < 0.15 * one.before)
 
 
+def test_a_short_log_is_one_part(model: SerialModel, log: JointLog) -> None:
+    trials = trials_of(model, [part(log, most=round(6.0 * RATE_HZ))])
+    assert trials.names == ("log 21",)
+    assert not judged(model, [part(log, most=round(6.0 * RATE_HZ))]).validated
+
+
 @pytest.mark.parametrize("kind", ["torque", "usable"])
 def test_logs_are_cut_at_gaps(model: SerialModel, log: JointLog, kind: str) -> None:
     """One of a second; a short one is bridged, and what lies between gaps that are too near is left out."""
@@ -150,6 +163,19 @@ def test_logs_are_cut_at_gaps(model: SerialModel, log: JointLog, kind: str) -> N
     assert what(verdict) == {("torque_offset", "elbow")}
 
 
+def test_a_joint_without_torques_is_left_out(bare: SerialModel, log: JointLog) -> None:
+    torque = log.torque.copy()
+    torque[:, 1] = np.nan
+    silent = replace(log, torque=torque)
+    assert trials_of(bare, [silent]).joints.tolist() == [0, 2]
+    verdict = judged(bare, [silent])
+    assert what(verdict) == {("friction", "all joints")}
+    assert [m.place for m in verdict.findings[0].members] == ["turn", "elbow"]
+    for member in verdict.findings[0].members:
+        assert member.values["coulomb_Nm"] == pytest.approx(0.5, abs=4.0 * member.errors["coulomb_Nm"])
+    assert all(np.isfinite(one.after).all() for one in verdict.predictions)
+
+
 def test_logs_that_cannot_be_used(model: SerialModel, log: JointLog) -> None:
     with pytest.raises(InputError, match="no torques"):
         judged(model, [replace(log, torque=None)])
@@ -157,6 +183,15 @@ def test_logs_that_cannot_be_used(model: SerialModel, log: JointLog) -> None:
         judged(model, [replace(log, torque=np.full(log.q.shape, np.nan))])
     with pytest.raises(InputError, match=r"at least 2\.2 s without gaps"):
         judged(model, [replace(log, usable=np.zeros(len(log.time), dtype=bool))])
+
+
+@pytest.mark.parametrize("every", [1, 5])
+def test_rates_do_not_change_the_verdict(bare: SerialModel, every: int) -> None:
+    """250 and 50 Hz."""
+    true = both(NAMED, loaded)
+    friction, load = judged(bare, [part(arm_log(true, 24), every)]).findings
+    assert friction.told == (("friction", "all joints"),)
+    assert ("payload", "three") in load.told
 
 
 # --- noise
@@ -175,7 +210,32 @@ def test_noise_is_that_of_the_sensors(model: SerialModel) -> None:
     np.testing.assert_allclose(slow, true, rtol=0.25)
 
 
+def test_louder_sensors_are_heard(model: SerialModel, log: JointLog) -> None:
+    rng = np.random.default_rng(0)
+    more = 0.2 * rng.standard_normal(len(log.time))
+    loud = replace(log, torque=log.torque + more[:, None] * ELBOW)
+    quiet, louder = (trials_of(model, [x]).noise[0].std(axis=0) for x in (log, loud))
+    np.testing.assert_allclose(louder[:2], quiet[:2], rtol=0.05)
+    assert louder[2] > 4.0 * quiet[2]
+
+
 # --- what is not listed, and what is left out
+
+
+def test_what_no_table_lists_is_located(model: SerialModel, log: JointLog) -> None:
+    torque = log.torque + 0.3 * np.sin(5.0 * log.q) * ELBOW
+    verdict = judged(model, [replace(log, torque=torque)], excluded=["ripple"])
+    (finding,) = (f for f in verdict.findings if f.cause == "unlisted")
+    assert (finding.place, finding.of) == ("elbow", "position")
+    assert finding.probability > 0.5
+    assert finding.law is not None
+    told = finding.law.to_dict()
+    assert (told["targets"], told["of"], told["unit"]) == (["torque_3"], "q_3", "N m")
+    assert set(told["units"]) == set(finding.members[0].values)
+    away = np.subtract(told["traces"][0]["error"][0], told["traces"][0]["law"][0])
+    assert np.std(away) < 0.1 * np.std(told["traces"][0]["error"][0]) + 0.02
+    assert {f.place for f in verdict.findings} == {"elbow"}
+    assert verdict.verdict != "explained"
 
 
 def test_causes_that_are_left_out_are_not_named(model: SerialModel, log: JointLog) -> None:

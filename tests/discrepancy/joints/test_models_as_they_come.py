@@ -102,6 +102,16 @@ def test_a_link_without_inertial_that_moves_alone_is_massless(tmp_path) -> None:
     assert "Links that move without an <inertial> are read without mass: wrist." in found.notes
 
 
+def test_a_frame_that_moves_without_inertia_is_a_point(tmp_path) -> None:
+    frame = link("imu", inertial(0.01, "0.1 0 0", "0 0 0 0 0 0")) + joint(
+        "fix", "hand", "imu", "0 0 0", "fixed"
+    )
+    found = load_model(urdf(tmp_path, DUO + frame))
+    tiny = frame.replace('ixx="0" iyy="0" izz="0"', 'ixx="1e-10" iyy="1e-10" izz="1e-10"')
+    same_torques(found, mujoco.MjModel.from_xml_path(str(urdf(tmp_path, DUO + tiny, "plain.urdf"))))
+    assert "Links with a mass and no inertia are read as points: imu." in found.notes
+
+
 @pytest.mark.parametrize(("axis", "moment"), [("1 0 0", 0.006), ("0 1 0", 0.044), ("0 0 1", 0.0505)])
 def test_an_inertia_that_no_body_has_is_computed_with_as_written(tmp_path, axis, moment) -> None:
     """Torque per acceleration about an axis through the joint: moment + m r^2; A + B < C by 1 %."""
@@ -318,6 +328,17 @@ def test_advice_for_objects_beside_the_arm_and_loops_of_a_gripper_works(tmp_path
     assert load_model(path, {**first, "grip": "0"}).joints == ("hip", "yaw", "pitch", "out", "elbow")
 
 
+def test_a_value_that_is_advised_is_within_the_range(tmp_path) -> None:
+    """The reference pose is out of the grip's range, and its nearest end has more digits than are usually printed."""
+    loop = '<equality><connect body1="finger" body2="fore" anchor="0 0 0.1"/></equality>'
+    fixed = TORSO.replace('<freejoint name="root"/>', "").replace("</worldbody>", f"</worldbody>{loop}")
+    fixed = fixed.replace('range="0 0.04"', 'range="-20 -12.345641"')
+    path = tmp_path / "torso.xml"
+    path.write_text(re.sub("<keyframe>.*</keyframe>", "", fixed), encoding="utf-8")
+    ((locks, _),) = advised(path)
+    assert load_model(path, locks).joints == ("hip", "yaw", "pitch", "out", "elbow")
+
+
 def test_a_locked_leader_takes_its_follower_along(tmp_path) -> None:
     mimic = '<mimic joint="left_joint" multiplier="-1.5" offset="0.02"/>'
     path = urdf(tmp_path, DUO + jaw("right", -1, mimic) + jaw("left", 1))
@@ -384,3 +405,16 @@ def test_numbers_and_names_that_no_model_has_are_refused(tmp_path, case) -> None
     with pytest.raises(InputError, match=re.escape(said)) as refused:
         load_model(path)
     assert str(refused.value).startswith(f"{path}: ")
+
+
+def test_a_limit_may_be_infinite(tmp_path) -> None:
+    assert load_model(urdf(tmp_path, DUO.replace('effort="50"', 'effort="inf"'))).joints == (
+        "shoulder",
+        "elbow",
+    )
+
+
+def test_no_joint_is_locked_at_infinity(tmp_path) -> None:
+    path = urdf(tmp_path, DUO.replace("revolute", "continuous"))
+    with pytest.raises(InputError, match="lock of elbow is '1e999'; it must be a number in rad"):
+        load_model(path, ["elbow=1e999"])

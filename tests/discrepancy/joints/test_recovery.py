@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from discrepancy.evidence.search import Chosen, Search, floor_of
+from discrepancy.joints.diagnosed import JointDiagnosed
 from discrepancy.joints.model import load_model
 from discrepancy.joints.problem import joint_problem
 from discrepancy.joints.trials import trials_of
@@ -95,6 +96,11 @@ def geom_mass(place: int, mass: float) -> Callable[[mujoco.MjSpec], None]:
     return change
 
 
+def test_the_model_as_it_is(tmp_path: Path) -> None:
+    for xml in (SPRING, CART):
+        assert not verdict_on(tmp_path, xml, lambda spec: None).findings
+
+
 def test_mass_on_a_spring(tmp_path: Path) -> None:
     """Twice the mass: of the link, or of a load on it, which one joint cannot tell apart."""
     verdict = verdict_on(tmp_path, SPRING, geom_mass(0, 1.0))
@@ -144,6 +150,17 @@ def test_link_of_another_mass_and_centre(tmp_path: Path) -> None:
     assert {key[:2] for key in found} == {("link_mass", "two")}
     values = [found["link_mass", "two", n] for n in ("excess_kg", "x_m", "y_m", "z_m")]
     assert values == pytest.approx([1.5, 0.05, 0.03, 0.0], rel=0.02, abs=1e-3)
+
+
+def test_a_link_that_is_called_as_another_links_joint(tmp_path: Path) -> None:
+    def change(spec: mujoco.MjSpec) -> None:
+        spec.body("j1").mass = 4.0
+
+    verdict = verdict_on(tmp_path, ARM.replace('body name="two"', 'body name="j1"'), change)
+    (finding,) = verdict.findings
+    assert (finding.place, finding.joint) == ("j1", None)
+    (told,) = JointDiagnosed(verdict, None).to_dict()["causes"]
+    assert (told["place"], told["joint"]) == ("link j1", None)
 
 
 def test_rotors_of_an_arm(tmp_path: Path) -> None:
@@ -200,6 +217,16 @@ def test_what_no_table_lists_goes_with_its_signal(tmp_path: Path) -> None:
 
     assert signal(disc) == ("j2", "reading")
     assert signal(neighbour) == ("j2", "neighbour's torque")
+
+
+def test_tolerances_of_a_cause_that_is_left_out_swallow_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM, encoding="utf-8")
+    spec = mujoco.MjSpec.from_string(ARM)
+    spec.option.gravity = [1.0, 0.0, -9.76]
+    verdict = judged(load_model(path), [log_of(spec, 1), log_of(spec, 2)], excluded=("gravity_direction",))
+    assert verdict.verdict == "miscalibrated"
+    assert [s.cause for s in verdict.scatter] == ["gravity_direction"]
 
 
 def test_what_gives_way_to_gravity_is_no_error_of_a_reading_besides(tmp_path: Path) -> None:

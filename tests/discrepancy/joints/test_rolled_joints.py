@@ -22,6 +22,7 @@ from discrepancy.joints.rolled import (
     diverged,
     in_neither,
     laws_without,
+    longest,
     rms,
     rolled_out,
     starts,
@@ -206,6 +207,23 @@ def test_what_is_found_predicts_the_other_trial(two_links: SerialModel, rubbing:
     assert "Rolled out from measured states under the logged torques (on blocks left out of the fit)" in text
 
 
+@pytest.mark.usefixtures("few_starts")
+def test_values_are_those_of_the_other_trials(two_links: SerialModel, rubbing: JointLog) -> None:
+    """Where these are wrong, the gain is gone, whatever all trials together say."""
+    parts = halves(signals(two_links, rubbing))
+    rolled = rolled_out(verdict(two_links, parts, [rubs()], lambda trial: (rubs(0.0),)))
+    assert rolled is not None
+    assert rolled["horizons"][1]["removed"][1] == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.usefixtures("few_starts")
+def test_nothing_named_has_no_after(two_links: SerialModel, rubbing: JointLog) -> None:
+    rolled = rolled_out(verdict(two_links, [signals(two_links, rubbing)]))
+    assert rolled is not None
+    assert not rolled["validated"]
+    assert {(h["after"], h["removed"]) for h in rolled["horizons"]} == {(None, None)}
+
+
 def test_no_rollouts_with_a_reference(two_links: SerialModel, rubbing: JointLog) -> None:
     made = verdict(two_links, [signals(two_links, rubbing)], [rubs()])
     made.reference = ("before",)
@@ -229,6 +247,13 @@ def test_what_mujoco_refuses_is_said(two_links: SerialModel, rubbing: JointLog) 
     assert rolled["refused"][0].startswith("trial 1: MuJoCo refuses the model")
     assert rolled["horizons"][0]["after"]["rms"] == [None, None]
     assert rolled["horizons"][0]["before"]["rms"] != [None, None]
+
+
+@pytest.mark.usefixtures("few_starts")
+def test_many_trials_have_no_more_starts(two_links: SerialModel, rubbing: JointLog) -> None:
+    rolled = rolled_out(verdict(two_links, halves(signals(two_links, rubbing), 20)))
+    assert rolled is not None
+    assert 4 <= rolled["horizons"][0]["starts"] <= 11
 
 
 def test_a_joint_without_torques_is_named(two_links: SerialModel, rubbing: JointLog) -> None:
@@ -258,6 +283,30 @@ def test_no_start_where_something_is_not_known(two_links: SerialModel, rubbing: 
     assert event.sum() > good.sum() - 0.55 * s.rate_hz
 
 
+def test_starts_reach_no_farther_than_their_trial() -> None:
+    good = np.ones(40, dtype=bool)
+    assert starts(good[:30], 10, 5, 50, 25) == []
+    assert starts(good, 10, 10, 15, 5) == [(10, 15), (20, 15), (30, 9)]
+    good[22] = False
+    assert starts(good, 10, 10, 15, 5) == [(10, 11), (30, 9)]
+
+
+def test_a_log_with_holes_every_so_often_has_no_horizon_that_is_longer(tmp_path: Path) -> None:
+    """Known for 0.32 s at a time, smoothing left out: none of 0.5 s; known for less than 0.1 s, none at all."""
+    model = read(tmp_path, TURNTABLE)
+    s = signals(model, turning())
+
+    def with_holes(apart_s: float) -> Any:
+        known = np.ones((len(s.time), 1), dtype=bool)
+        known[:: round(apart_s * s.rate_hz)] = False
+        return rolled_out(verdict(model, [replace(s, usable=known)]))
+
+    assert {h["seconds"] for h in with_holes(0.4)["horizons"]} == {0.1, 0.2}
+    none = with_holes(0.15)
+    assert none["horizons"] == []
+    assert none["why_not"].startswith("nowhere in a trial")
+
+
 def test_what_diverges_is_counted_and_in_no_error() -> None:
     before = np.array([[0.1, 0.3], [np.nan, 0.4], [0.2, np.nan], [0.2, 0.0]])
     np.testing.assert_array_equal(diverged(before), [1, 1])
@@ -265,6 +314,17 @@ def test_what_diverges_is_counted_and_in_no_error() -> None:
     np.testing.assert_allclose(in_neither(before, before / 2.0)[2], 0.5)
     assert np.isnan(rms(np.full((4, 1), np.nan))).all()
     assert np.isnan(rms(np.array([[0.1], [np.nan], [np.nan]]))).all()
+
+
+def test_a_joint_that_is_half_a_turn_off_has_diverged(tmp_path: Path) -> None:
+    log, model = turning(0.0), read(tmp_path, TURNTABLE)
+    assert log.torque is not None
+    s = signals(model, replace(log, torque=log.torque + 20.0))
+    error = let_go(model, s, 300, 125)[:, 0]
+    # Half of 20 N m over 0.5 kg m^2 times time squared is pi at 0.396 s.
+    gone = np.flatnonzero(np.isnan(error))
+    assert gone[0] / s.rate_hz == pytest.approx(np.sqrt(2.0 * np.pi * INERTIA / 20.0), abs=2.0 / s.rate_hz)
+    assert np.isnan(error[gone[0] :]).all()
 
 
 def commanded(rubs: float, kp: float = 40.0, kv: float = 2.0) -> JointLog:
@@ -313,6 +373,17 @@ def test_closed_loop_of_mujocos_own_servo(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("few_starts")
+def test_closed_loops_are_as_long_as_one_hundred_seconds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("discrepancy.joints.rolled.MOST_LOOP_S", 4.0)
+    model = read(tmp_path, TURNTABLE)
+    rolled = rolled_out(verdict(model, halves(signals(model, commanded(0.0)))))
+    assert rolled is not None
+    assert [b["seconds"] for b in rolled["commanded"]["blocks"]] == pytest.approx([2.0, 2.0], abs=0.01)
+
+
+@pytest.mark.usefixtures("few_starts")
 def test_loops_that_the_map_does_not_tell_are_not_closed(tmp_path: Path) -> None:
     model, log = read(tmp_path, TURNTABLE), commanded(1.0)
     no_gain = replace(log, drive=replace(log.drive, position_gain=np.full(1, np.nan)))
@@ -337,6 +408,12 @@ def test_the_law_of_a_firmware_is_that_of_the_other_trials(tmp_path: Path) -> No
     assert 2.0 < laws_without([s], 0)[0].per_rad < 3.0  # of a single trial, its own
     apart = [replace(part, log=replace(s.log, name=f"log {k}")) for k, part in enumerate(parts)]
     assert len(laws_without(apart, 0)) == 1
+
+
+def test_the_longest_run_of_what_is_known() -> None:
+    good = np.array([1, 1, 0, 1, 1, 1, 0, 1], dtype=bool)
+    assert longest(good) == slice(3, 6)
+    assert longest(~np.ones(3, dtype=bool)) == slice(0, 0)
 
 
 def test_dry_friction_of_the_stepper_stops_a_joint_and_never_drives_it() -> None:

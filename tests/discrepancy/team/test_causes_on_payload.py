@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from discrepancy.candidate import Transient
 from discrepancy.team.candidates import in_shapes
-from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes import CAUSES, cable
 from estimator.arm.delta import forward_kinematics
 from estimator.arrays import inertia_parameters
 from outside_wrench import check_wrench, point, relieved, reported
@@ -111,6 +111,44 @@ def test_cable_of_the_payload(case, motion, axis):
     np.testing.assert_allclose([physical[f"point_{a}_m"] for a in "xyz"], tied, atol=1e-12)
     np.testing.assert_allclose([physical[f"anchor_{a}_m"] for a in "xyz"], anchor, atol=1e-12)
     assert physical["length_m"] == pytest.approx(length_m)
+
+
+def test_a_cable_that_is_tied_nowhere_near_or_behind_is_tied_within_a_room(case):
+    """What the data do not tell may go anywhere; the answer does not."""
+    shape = cable_shape(HOME, HOME + np.array([0.0, 0.0, 1.0]), 0.9)
+    for near in (-3.0, 0.0, 1e-9, 100.0):
+        physical = reported(case, "tether", [0.0, 0.0, 0.0, 5.0], shape | {"near_per_m": near})
+        assert HOME[2] + 0.1 < physical["anchor_z_m"] <= HOME[2] + 20.0
+        assert physical["length_m"] >= 0.0
+
+
+@pytest.mark.parametrize("name", ["tether", "payload_tether"])
+def test_a_cable_may_grow_into_a_strap_and_a_strap_or_a_spring_into_nothing(name):
+    """As it grows it is the same cable; and it pays for what it may be."""
+    cause, plain = CAUSES[name], CAUSES[name].shapes[0]
+    begun = cause.further(plain)[0]
+    (strap,) = cause.grown(begun)
+    moved = np.array([[0.01, -0.02, 0.03], [-0.04, 0.01, 0.0]])
+    np.testing.assert_array_equal(cable.pull(strap, moved), cable.pull(begun, moved))
+    assert not cause.grown(strap)
+    assert not cause.grown(plain)
+    assert cause.alike(strap) > cause.alike(begun)
+
+
+def test_ways_of_a_cable_begin_everywhere():
+    """No direction is further from one of them than 35 deg, and a tether's point is on the line of each."""
+    ways = [cable.direction(way) for way in cable.first_ways()]
+    rng = np.random.default_rng(3)
+    anywhere = rng.standard_normal((5000, 3))
+    nearest = np.max(anywhere @ np.transpose(ways), axis=1) / np.linalg.norm(anywhere, axis=1)
+    assert np.degrees(np.arccos(nearest.min())) < 35.0
+    at = np.array([0.3, -0.2, 0.1])
+    plain = dict(zip(("lever_x_m", "lever_y_m", "lever_z_m"), at, strict=True))
+    begun = CAUSES["payload_tether"].further(plain)
+    assert len(begun) == len(ways) * len(cable.CABLE_STRETCHES_M)
+    for shape in begun:
+        np.testing.assert_allclose(np.cross(at - cable.lever(shape), cable.direction(shape)), 0.0, atol=1e-12)
+        assert CAUSES["payload_tether"].alike(shape) > CAUSES["payload_tether"].alike(plain)
 
 
 @pytest.mark.parametrize(

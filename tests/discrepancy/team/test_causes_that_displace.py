@@ -1,15 +1,20 @@
 """Displaced grasps and bases, put into an exact recording by hand: the joints adapt, the payload moves as it does."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.signal import chirp
 from scipy.spatial.transform import Rotation
 
+from discrepancy.team.candidates import in_shapes, shape_steps
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes.yielding import lagging
 from discrepancy.team.linear.trial_linear import linearise
 from estimator.arm.delta import forward_kinematics, inverse_kinematics, jacobian, leg_geometry
+from estimator.arm.dynamics import arm_torque
 from estimator.rigid_team import balance
 from outside_wrench import reported
 from team_case import DESIGN, assert_close, rate_of, residual_of
@@ -52,6 +57,12 @@ def own_torque(phi, up):
     return np.stack(
         [(energy(phi + step * e) - energy(phi - step * e)) / (2 * step) for e in np.eye(3)], axis=1
     )
+
+
+def test_weight_of_the_arm_is_that_of_the_estimator(case):
+    phi = case.signals.phi[::50, 0]
+    still = np.zeros_like(phi)
+    np.testing.assert_allclose(own_torque(phi, (0, 0, 1)), arm_torque(phi, still, still, DESIGN), atol=1e-7)
 
 
 def check_pose(case, signals, column, values, tolerance=0.01, balance_tolerance=0.03, moment=None):
@@ -115,6 +126,16 @@ def following(time, force, relaxation_s, inertia_s2=0.0):
     return solved.y.T[:, :3]
 
 
+@pytest.mark.parametrize(("relaxation_s", "inertia_s2"), [(0.03, 0.0), (0.06, 1e-3), (0.01, 4e-3)])
+def test_a_lag_follows_forces_as_fast_as_its_mass_swings(relaxation_s, inertia_s2):
+    """From 0.3 to 9 Hz: at 2.5 and 5 Hz the masses here swing by themselves."""
+    time = np.arange(0.0, 8.0, 0.01)
+    force = 3.0 + chirp(time[:, None] + [0.0, 0.3, 0.9], 0.3, 8.0, 9.0)
+    shape = {"relaxation_s": relaxation_s} | ({"inertia_s2": inertia_s2} if inertia_s2 else {})
+    expected = following(time, force, relaxation_s, inertia_s2)
+    np.testing.assert_allclose(lagging(force, 100.0, shape), expected, atol=5e-3)
+
+
 @pytest.mark.parametrize(("robot", "relaxation_s"), [(0, 0.03), (1, 0.03), (2, 0.2)])
 def test_grasp_flex(case, robot, relaxation_s):
     """The payload hangs back against the force on it, so the flange leads by compliance times force.
@@ -147,6 +168,29 @@ def test_a_grasp_that_turns(case, robot, offset_m):
     assert np.abs(changed[:, :12]).max() > 1e-4
     assert_close(column[:, :12], changed[:, :12], 0.02)
     assert_close(column[:, 12:], changed[:, 12:], 0.1)
+
+
+def test_a_grasp_without_a_point_to_turn_about_does_not_turn(case):
+    cause = CAUSES["grasp_flex"]
+    healthy = cause.candidate({"compliance_m_per_N": 1e-7, "turning_rad_per_N": 1e-6}, cause.shapes[0], 2)
+    columns = cause.columns(case.linear, 1, 0, healthy.shape)
+    assert columns[..., 0].any()
+    assert not columns[..., 1].any()
+    assert cause.physical(np.array([2e-6, 4e-5]), SimpleNamespace(shape=healthy.shape)) == {
+        "compliance_m_per_N": 2e-6, "turning_rad_per_N": 0.0, "relaxation_s": 0.005, "offset_m": 0.0,
+    }  # fmt: skip
+    turning = next(
+        c for c in in_shapes(healthy, CAUSES[healthy.cause].shapes, 1) if c.shape.get("offset_m", 0.0) < 0.0
+    )
+    assert cause.physical(np.array([2e-6, 4e-5]), SimpleNamespace(shape=turning.shape)) == {
+        "compliance_m_per_N": 2e-6, "turning_rad_per_N": 4e-5, "relaxation_s": 0.005, "offset_m": -0.05,
+    }  # fmt: skip
+    # Steps and finer shapes stay on their side of the gimbal.
+    assert all(less.shape["offset_m"] < 0.0 for less, _, size in shape_steps(turning) if size > 0.0)
+    finer = sorted(
+        {c.shape["offset_m"] for c in in_shapes(turning, CAUSES[turning.cause].finer(turning.shape), 1)}
+    )
+    assert finer == pytest.approx([-0.1, -0.07, -0.05, -0.035, -0.025])
 
 
 @pytest.mark.parametrize(("robot", "contact_per_N"), [(0, 0.0), (1, 0.0), (1, 0.02)])

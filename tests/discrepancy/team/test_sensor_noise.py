@@ -7,6 +7,11 @@ import pytest
 from scipy.signal import butter, sosfiltfilt
 
 from discrepancy.team.linear.noise import (
+    MODEL_ABOVE,
+    MODEL_BELOW_HZ,
+    MODEL_PHI_RAD,
+    MODEL_TAU_NM,
+    MODEL_THETA_RAD,
     Fast,
     Noise,
     chattering,
@@ -63,6 +68,67 @@ def test_step_and_noise_of_rounded_angles(rng, bits, sigma_steps):
     np.testing.assert_array_equal(noise.step[2], 0.0)
 
 
+@pytest.mark.parametrize("sigma", [5e-5, 1e-3])
+def test_continuous_angles(rng, sigma):
+    noise = Noise.of([trial(rng, (0.0, sigma), (0.0, 0.05))])
+    np.testing.assert_array_equal(noise.step, 0.0)
+    for found, expected in ((noise.sigma[:2], sigma), (noise.sigma[2], 0.05)):
+        np.testing.assert_allclose(found, expected, rtol=0.15)
+        assert np.mean(found) == pytest.approx(expected, rel=0.07)
+
+
+def test_grid_finer_than_motion_shows_at_rest_only(rng):
+    """Of 20 bits hardly two samples in motion agree: as good as continuous, unless the joints rest for a while."""
+    step = 2 * np.pi / 2**20
+    moving = trial(rng, (step, 0.0))
+    noise = Noise.of([moving])
+    np.testing.assert_array_equal(noise.step[:2], 0.0)
+    np.testing.assert_allclose(noise.sigma[:2], step / np.sqrt(12), rtol=0.1)
+    phi, theta = moving.phi.copy(), moving.theta.copy()
+    for x in (phi, theta):
+        x[1000:2500] = x[1000]
+    np.testing.assert_allclose(
+        Noise.of([Signals(TIME, phi, theta, moving.tau, RATE)]).step[:2], step, rtol=1e-6
+    )
+
+
+def test_exact_sensors_leave_what_the_model_leaves(rng):
+    """The model's own errors are drawn besides: white below a cut-off, little above it; the same at rest."""
+    exact = trial(rng)
+    noise = Noise.of([exact])
+    np.testing.assert_allclose(noise.sigma, 0.0, atol=1e-9)
+    errors = next(noise.draws(exact, rng, 1))
+    for found, floor in (
+        (errors.phi, MODEL_PHI_RAD),
+        (errors.theta, MODEL_THETA_RAD),
+        (errors.tau, MODEL_TAU_NM),
+    ):
+        power = np.mean(np.abs(np.fft.rfft(found, axis=0)) ** 2, axis=(1, 2)) / SAMPLES
+        hz = np.fft.rfftfreq(SAMPLES, 1.0 / RATE)
+        assert np.mean(power[hz < 0.7 * MODEL_BELOW_HZ]) == pytest.approx(floor**2 * RATE / 100.0, rel=0.15)
+        assert np.mean(power[hz > 2.0 * MODEL_BELOW_HZ]) == pytest.approx((MODEL_ABOVE * floor) ** 2, rel=0.1)
+    still = Signals(
+        TIME, *(np.tile(x[:1], (SAMPLES, 1, 1)) for x in (exact.phi, exact.theta, exact.tau)), RATE
+    )
+    errors = next(noise.draws(still, rng, 1))
+    np.testing.assert_array_less(np.std(errors.phi, axis=0), 0.01 * MODEL_PHI_RAD)
+    assert np.any(np.abs(errors.phi) > 0.2 * MODEL_PHI_RAD)
+
+
+def test_torques_may_be_rounded_too(rng):
+    noise = Noise.of([trial(rng, (2 * np.pi / 2**16, 0.0), (0.02, 0.02))])
+    np.testing.assert_allclose(noise.step[2], 0.02, rtol=1e-6)
+    np.testing.assert_allclose(
+        np.sqrt(noise.sigma[2] ** 2 + 0.02**2 / 12), np.hypot(0.02, 0.02 / np.sqrt(12)), rtol=0.1
+    )
+
+
+def test_every_trial_may_have_a_grid_of_its_own(rng):
+    step = 2 * np.pi / 2**14
+    noise = Noise.of([trial(rng, (step, 0.0)) for _ in range(5)])
+    np.testing.assert_allclose(noise.step[:2], step, rtol=1e-6)
+
+
 def smoothed(x):
     """The rows' band: below 5 Hz."""
     return sosfiltfilt(butter(3, 5.0, fs=RATE, output="sos"), x, axis=0)
@@ -106,6 +172,15 @@ def test_draws_have_the_variance_of_real_rounding_at_rest(rng, sigma_steps):
         assert whole[1] == pytest.approx(whole[0], rel=0.12)
 
 
+def test_draws_of_continuous_channels_are_white(rng):
+    noise = Noise(np.zeros((3, 2, 3)), np.full((3, 2, 3), 0.01))
+    errors = next(noise.draws(trial(rng), rng, 1))
+    assert np.std(errors.tau) == pytest.approx(0.01, rel=0.05)
+    x = errors.phi.reshape(SAMPLES, 6)
+    assert np.max(np.abs(np.mean(x[1:] * x[:-1], axis=0))) < 0.1 * 0.01**2
+    assert np.corrcoef(errors.phi.ravel(), errors.theta.ravel())[0, 1] == pytest.approx(0.0, abs=0.05)
+
+
 @pytest.mark.parametrize("hz", [29.7, 41.0])
 def test_a_joint_that_chatters_is_not_taken_for_a_noisy_sensor(rng, hz):
     step = sigma = 0.01
@@ -138,3 +213,20 @@ def test_what_is_said_of_a_joint_that_chatters(rng):
     assert "driven joint 2 of robot 1 oscillates faster than 25 Hz, with 1.4 N m rms" in said
     small = replace(loud, tau=calm.tau + 0.04 * (tau - calm.tau))
     assert said_of(small) == ()
+
+
+def test_channels_have_resolutions_of_their_own(rng):
+    x = trial(rng)
+    step = 2 * np.pi / 2**14
+    phi = x.phi.copy()
+    phi[:, 1, 2] = np.round(phi[:, 1, 2] / step) * step
+    phi[:, 0, 0] += 1e-3 * rng.standard_normal(SAMPLES)
+    noise = Noise.of([Signals(TIME, phi, x.theta, x.tau, RATE)])
+    expected = np.zeros((2, 3))
+    expected[1, 2] = step
+    np.testing.assert_allclose(noise.step[0], expected, rtol=1e-6)
+    assert noise.sigma[0, 0, 0] == pytest.approx(1e-3, rel=0.1)
+    assert noise.sigma[0, 0, 1] == pytest.approx(0.0, abs=1e-9)
+    errors = next(noise.draws(Signals(TIME, phi, x.theta, x.tau, RATE), rng, 1))
+    assert np.std(errors.phi[:, 0, 0]) == pytest.approx(1e-3, rel=0.1)
+    assert np.std(errors.phi[:, 0, 1]) < MODEL_PHI_RAD

@@ -6,10 +6,11 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
-from discrepancy.team.causes.slosh import Pendulum, swung
-from outside_wrench import check_wrench, point, reported
+from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes.slosh import OFF, Pendulum, swung
+from outside_wrench import check_wrench, point, relieved, reported
 from recorded_team import COM
-from team_case import DESIGN
+from team_case import DESIGN, residual_of
 
 MASS_KG, GRAVITY, STEP_S = 0.5, 9.81, 1e-3
 HEAVY = 1e6  # of what moves the payload: it goes its way, whatever hangs in it
@@ -123,6 +124,15 @@ def test_a_pendulum_swings_as_far_as_it_is_moved(moved_mps2, across_m, allowed):
         assert np.sqrt(np.mean((said - found) ** 2)) < allowed * np.sqrt(np.mean(found**2))
 
 
+def test_what_swings_beyond_all_bounds_ends():
+    """Driven on resonance by a g it goes over the top; what is said of it is finite and no further than its rod."""
+    time = 2e-3 * np.arange(5000)
+    drive, none = (9.0 * np.sin(np.sqrt(GRAVITY / 0.25) * time))[:, None], np.zeros(len(time))
+    pendulum = Pendulum(0.25, 0.02, GRAVITY, 500.0)
+    (x, y), (moment, _), up = swung([drive, drive], [none, none], none, [pendulum, pendulum])
+    assert all(np.isfinite(each).all() for each in (x, y, moment, up))
+
+
 def turning(motion, time):
     """Angular velocity of the payload in {b1}, its pose differentiated."""
     R_dot = make_interp_spline(time, motion[0], k=5).derivative(1)(time)
@@ -180,6 +190,46 @@ def test_slosh(case, motion):
     physical = reported(case, "slosh", values, shape)
     np.testing.assert_allclose([physical[f"point_{a}_m"] for a in "xyz"], at)
     assert physical["mass_kg"] == mass
+
+
+def test_a_pendulum_far_from_the_centre_is_swung_where_it_hangs(case, motion):
+    """Its moments are about the centre of mass all the same; from there, straight lines leave more."""
+    mass, off = 0.4, np.array([0.1, -0.2, 0.25])
+    time, up = case.signals.time, np.array([0.0, 0.0, 1.0])
+    accel = make_interp_spline(time, point(motion, COM + off), k=5).derivative(2)
+    fixed = make_interp_spline(time, 0.2 * np.cross(up, turning(motion, time))[:, :2], k=3)
+    speed, swung = swinging(time, accel, (0.2, 0.2), 0.05, fixed)
+    force = -mass * swung
+    behind = np.column_stack([speed[:, :2] - fixed(time), np.zeros(len(time))])
+    w = np.sqrt(DESIGN.gravity_mps2 / 0.2)
+    damped = np.cross([0.0, 0.0, -0.2], 2 * 0.05 * w * mass * behind)
+    moment = np.cross(motion[0] @ (COM + off), force) + damped
+    values, plain = np.append(mass, mass * off), {"length_m": 0.2, "damping_ratio": 0.05}
+    there = plain | dict(zip(OFF, off.tolist(), strict=True))
+    check_wrench(case, motion, "slosh", 0, 0, there, values, force, moment, 0.02)
+    changed = residual_of(case, relieved(case, motion, force, moment)) - case.linear.residual
+    left = [
+        np.linalg.norm(CAUSES["slosh"].columns(case.linear, 0, 0, shape) @ values - changed)
+        for shape in (there, plain)
+    ]
+    assert left[0] < 0.7 * left[1]
+    assert reported(case, "slosh", values, there) == reported(case, "slosh", values, plain)
+
+
+@pytest.mark.parametrize(("second_m", "share"), [(0.08, 0.3), (0.5, 0.4)])
+def test_slosh_of_a_second_pendulum(case, motion, second_m, share):
+    """Beside the first: what two of one mode do, each with its share of the mass."""
+    mass, moments = 0.4, 0.4 * np.array([0.02, -0.03, 0.01])
+    plain = {"length_m": 0.2, "damping_ratio": 0.05}
+    values = np.append(mass, moments)
+
+    def of(shape):
+        return CAUSES["slosh"].columns(case.linear, 0, 0, shape) @ values
+
+    both = (1.0 - share) * of(plain) + share * of(plain | {"length_m": second_m})
+    np.testing.assert_allclose(
+        of(plain | {"second_length_m": second_m, "second_share": share}), both, atol=1e-9
+    )
 
 
 @pytest.mark.parametrize(("across_m", "heading"), [(0.08, 0.4), (0.45, -1.0)])

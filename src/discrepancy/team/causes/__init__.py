@@ -12,6 +12,7 @@ from discrepancy.team.causes.payload import Drag, PayloadMass, Push
 from discrepancy.team.causes.readings import (
     BaseTilt,
     ClockDelay,
+    EncoderPlay,
     LinkLength,
     PhiZero,
     SeaBias,
@@ -26,7 +27,7 @@ from discrepancy.team.causes.slosh import Slosh
 from discrepancy.team.causes.yielding import BaseCompliance, BaseCreep, GraspFlex, GraspPlay
 
 CATALOGUE = (
-    PhiZero, ThetaZero, LinkLength, BaseTilt, BaseCreep, BaseCompliance, SeaScale, SeaBias, SeaHardening,
+    PhiZero, ThetaZero, EncoderPlay, LinkLength, BaseTilt, BaseCreep, BaseCompliance, SeaScale, SeaBias, SeaHardening,
     SeaHysteresis, JointFriction, GimbalFriction, TorqueSkew, TorqueLag, SensorLag, ClockDelay, GraspFlex,
     GraspPlay, Tether, PayloadTether, Push, Drag, Slosh, PayloadMass,
 )  # fmt: skip

@@ -5,12 +5,16 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from discrepancy.team.causes.base import Cause, ReadingError, one_joint, one_robot, stack
+from discrepancy.team.causes.friction import in_parts, pieces_while, played
+from discrepancy.team.linear.rows import PATCH_COLUMNS
 from estimator.arm.delta import LEG_DIRECTIONS, jacobian_of, leg_geometry
 from estimator.arm.motion import PHI
 from estimator.arm.unit import ArmUnit, design_of
+from estimator.arrays import Array
 
 
 class Late(ReadingError):
@@ -77,6 +81,62 @@ class ThetaZero(ReadingError):
 
     def errors(self, signals, robot, joint, shape, arm):
         return [{"theta": np.eye(3)[joint]}]
+
+
+PLAY_STEP_RAD, CROSSING_S = 1e-4, 0.3
+"""Change of a reading that is more than noise [rad], and longest time in which a joint crosses the play [s]. Chosen: a
+step of a 16-bit encoder; commanded motion turns round by 5 mrad in a quarter of a second."""
+BESIDE_S, CROSSING_KNOTS_S, CROSSING_OPEN = 0.05, 0.05, 0.2
+"""Time beside a crossing and between knots of what it leaves open [s], and standard deviation of that over the play.
+Chosen: the reading's last step comes up to 20 ms before the turn."""
+
+
+class EncoderPlay(ReadingError):
+    """A gimbal's encoder lags the joint by half the play, in the direction of motion (joints 1, 2, 3 are z, y, x)."""
+
+    title = "play in the encoder of {gimbal axis}"
+    family = "gimbal_zero"
+    parameters = ("play_rad",)
+    tolerances = (1e-4,)
+    positive = ("play_rad",)
+    clipped = ("play_rad",)
+    at = "gimbal joint"
+    separate = (
+        "Slow motion to and fro of one gimbal axis shows how long its reading stands still after each turn."
+    )
+
+    def sentence(self, n):
+        return f"the encoder of the gimbal joint has {n('play_rad', 'mrad', 1e3)} of play"
+
+    def errors(self, signals, robot, joint, shape, arm):
+        way, _ = _way_behind(signals.theta[:, robot, joint], signals.rate_hz)
+        return [{"theta": one_joint(-0.5 * way, joint)}]
+
+    def unknowns(self, trial, robot, joint, shape):
+        """While the joint crosses the play, its place there may differ from the law's."""
+        rate_hz = trial.signals.rate_hz
+        _, crosses = _way_behind(trial.signals.theta[:, robot, joint], rate_hz)
+        pieces = in_parts(pieces_while(crosses, rate_hz, CROSSING_KNOTS_S), PATCH_COLUMNS)
+        return trial.of_misreadings(robot, joint, ((at, CROSSING_OPEN * values) for at, values in pieces))
+
+
+def _way_behind(reading: Array, rate_hz: float) -> tuple[Array, NDArray[np.bool_]]:
+    """Place of a joint in the play of its encoder by the readings, -1 to 1, and where it crosses, shape (Q,) each.
+
+    It is that of the last motion. After a turn the reading stands still while the joint crosses the play, with constant
+    acceleration. Before the first motion the encoder is amid its play.
+    """
+    sign = np.sign(np.diff(played(reading, PLAY_STEP_RAD), prepend=reading[0]))
+    moves = np.flatnonzero(sign)
+    way, crosses, before = np.zeros(len(reading)), np.zeros(len(reading), dtype=bool), 0.0
+    beside = round(BESIDE_S * rate_hz)
+    for k in np.flatnonzero(np.diff(sign[moves], prepend=0.0)):
+        now, after = moves[k], sign[moves[k]]
+        start = max(0 if not k else moves[k - 1], now - round(CROSSING_S * rate_hz))
+        way[start:now] = before + (after - before) * np.linspace(0.0, 1.0, now - start, endpoint=False) ** 2
+        way[now:], before = after, after
+        crosses[max(0, start - beside) : now + beside] = True
+    return way, crosses
 
 
 class SeaScale(ReadingError):

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.arm.motion import COUNT, PHI, STEPS, THETA, ArmData, arm_data
+from estimator.arm.motion import COUNT, PHI, STEPS, THETA, ArmData, arm_data, yaw_matrix
 from estimator.arm.unit import Arms, arm_of, levelled
 from estimator.arrays import Array
 from estimator.rigid_team import Bases, Shared, fuse, fusion_matrix, needed_wrench, vee
 from estimator.signals import GraspData
-from estimator.so3 import cross
+from estimator.so3 import cross, times
 
 TEAM_JACOBIAN_HZ = 25.0
 """Rate of the knots between which derivatives are interpolated [Hz]. Chosen: twice that of the rows."""
@@ -95,7 +95,10 @@ def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, arms: Ar
         J = np.zeros((Q, 6 * N, COUNT))
         G = fusion_matrix(grasps)[:, 6 * i : 6 * i + 6]
         R_1i, p_1i = grasps.R_1i[i], grasps.p_1i[i]
-        dR, dh, dV, dV_dot, dF = _changes(s[:, i], arm_of(arms, i))  # (21, Q, ...)
+        dR, dh, dV, dV_dot, dF = _changes(s[:, i, :COUNT], arm_of(arms, i))  # (21, Q, ...)
+        if s.shape[2] > COUNT:
+            turned = yaw_matrix(s[:, i, COUNT + 2])
+            dR, dh = turned @ dR, times(turned, dh)
         turn = vee(dR @ np.swapaxes(data.R_bi[:, i], -1, -2))  # in {b_i}
         for j in range(1, N):
             at = 6 * (j - 1)

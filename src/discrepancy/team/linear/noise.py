@@ -8,10 +8,12 @@ from functools import cache
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.signal import butter, periodogram, sosfiltfilt
+from scipy.signal import butter, lfilter, periodogram, sosfiltfilt
 
 from discrepancy.team.linear.signals import TEAM_PRE_HZ, TEAM_SMOOTH_HZ, Signals
 from estimator.arrays import Array
+from estimator.calibrate.driven import Drift
+from estimator.calibrate.rules import ROCKING_S
 from estimator.filtering import differentiate, low_pass
 from estimator.quantisation import rounding_step
 from estimator.recording.metadata import SENSORS
@@ -134,6 +136,31 @@ def chattering(trials: Sequence[Signals]) -> tuple[str, ...]:
         "(mocobot inspect says at what frequency). The mean of what that does to torques and friction is in the model, "
         "as far as the samples tell it; what it does to readings that are not linear is in no cause.",
     )
+
+
+ROLLERS_RAD, ROLLERS_HZ = 3e-5, (2.0, 6.0)
+"""How the rollers of its wheels make a driving base rock, and at which frequencies. Measured on the shipped base."""
+
+
+def _unit(x: Array) -> Array:
+    return x / np.std(x)
+
+
+def drifts(signals: Signals, rng: np.random.Generator, count: int) -> Array:
+    """Draw what slip and rocking of driving bases add to their odometry, shape (Q, N, 6, count).
+
+    The errors are those of ``estimator.calibrate.driven``: rotation [rad] and displacement [m] of each base.
+    """
+    of, (Q, N) = Drift(), signals.phi.shape[:2]
+    white = rng.standard_normal((Q, N, 6, count))
+    same = float(np.exp(-1.0 / (ROCKING_S * signals.rate_hz)))
+    rock = lfilter([np.sqrt(1.0 - same**2)], [1.0, -same], white, axis=0)
+    walk = np.cumsum(white, axis=0) / np.sqrt(signals.rate_hz)
+    rolled = butter(2, ROLLERS_HZ, btype="band", fs=signals.rate_hz, output="sos")
+    rock[:, :, :2] += (ROLLERS_RAD / of.rock_rad) * _unit(sosfiltfilt(rolled, white[:, :, :2], axis=0))
+    sizes = np.array([of.rock_rad, of.rock_rad, of.slip_rad, of.slip_m, of.slip_m, of.rock_m])
+    walks = np.array([False, False, True, True, True, False])
+    return np.where(walks[:, None], walk, rock) * sizes[:, None]
 
 
 QUIET_RAD_PER_S, QUIET_NM_PER_S, QUIET_HZ, NOISY_STEPS = 3e-4, 0.22, 6.0, 0.15

@@ -38,6 +38,7 @@ class Signals:
         pre_hz: cut-off before the nonlinear formulas. It lies above any chatter, because the mean of a product is not
             the product of the means.
         doubt: possible error of interpolated readings over the rounding error, shape (Q,); None if no reading was held.
+        base: measured poses of driving bases, as in ``Recording``, shape (Q, N, 3); None for bases that stand.
     """
 
     time: Array
@@ -49,6 +50,7 @@ class Signals:
     smooth_hz: Array | None = None
     pre_hz: float = TEAM_PRE_HZ
     doubt: Array | None = None
+    base: Array | None = None
     _last: dict[tuple[str, int, int], Array] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
@@ -60,7 +62,8 @@ class Signals:
         recording, held, doubt = without_held(recording)
         known = recording.metadata
         signals = true_joints(known.arms, recording.phi, recording.theta, recording.tau)
-        return cls(recording.time, *signals, known.rate_hz, known.sampling, doubt=doubt if held else None)
+        doubts, base = doubt if held else None, recording.base
+        return cls(recording.time, *signals, known.rate_hz, known.sampling, doubt=doubts, base=base)
 
     def minus(
         self, phi: Array | float = 0.0, theta: Array | float = 0.0, tau: Array | float = 0.0

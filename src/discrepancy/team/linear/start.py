@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from discrepancy.team.linear.jacobian import by_signals
-from discrepancy.team.linear.noise import NOISE_SEED, Noise
+from discrepancy.team.linear.noise import NOISE_SEED, Noise, drifts
 from discrepancy.team.linear.rest import Resting, Tolerances, draws_at_a_time
 from discrepancy.team.linear.rows import Reduction, Whitening
 from discrepancy.team.linear.signals import Signals
@@ -131,7 +131,7 @@ def with_adjusted_signals(
         explained: residual of every sample that the causes explain, shape (Q, C).
     """
     shared, bases, arms = linear.shared, linear.bases, linear.arms
-    s = linear.s - _noise_in(linear.data, shared, bases, linear.reduction, noise, explained)
+    s = _without(linear.s, _noise_in(linear.data, shared, bases, linear.reduction, noise, explained))
     data = grasp_data(s, arms, linear.signals.rate_hz)
     return replace(
         linear,
@@ -165,10 +165,17 @@ def as_loud(signals: Signals, shared: Shared, bases: Bases, linear: TrialLinear,
     s = filtered(signals)
     data = grasp_data(s, linear.arms, signals.rate_hz)
     each = _noise_in(data, shared, bases, linear.reduction, noise)
-    quiet = grasp_data(s - each, linear.arms, signals.rate_hz)
+    quiet = grasp_data(_without(s, each), linear.arms, signals.rate_hz)
     here = _residual(data, shared, bases) - _residual(quiet, shared, bases)
     there = sum(linear.J(robot, slice(None), each[:, robot]) for robot in range(linear.robots))
     return linear.reduction(there - here)
+
+
+def _without(s: Array, noise: Array) -> Array:
+    """Subtract noise (Q, N, 21) from signals, which of driving bases have further slots."""
+    s = s.copy()
+    s[..., : noise.shape[2]] -= noise
+    return s
 
 
 def _residual(data: GraspData, shared: Shared, bases: Bases) -> Array:
@@ -255,9 +262,14 @@ def trial_at(recording: Recording, shared: Shared, noise: Noise) -> TrialLinear:
         noise: resolution of the sensors.
     """
     signals, arms = noise.known_to(Signals.of(recording)), recording.metadata.arms
-    angles = signals.phi[signals.keep], signals.theta[signals.keep]
-    bases = start_bases(*poses(*angles, arms), shared)
+    bases = start_bases(*_kept_poses(signals, arms), shared)
     return linearise(signals, shared, bases, arms, Reduction.of(signals), full=False, known=True)
+
+
+def _kept_poses(signals: Signals, arms: Arms) -> tuple[Array, Array]:
+    """Poses without the filters' transients, as from ``poses``."""
+    keep, base = signals.keep, signals.base
+    return poses(signals.phi[keep], signals.theta[keep], arms, None if base is None else base[keep])
 
 
 def without_bases(trial: TrialLinear, rows: Array) -> Array:
@@ -339,7 +351,7 @@ def linearised_trials(
     for recording, reduction in zip(recordings, reductions, strict=True):
         if len(reduction.time) < 4:
             raise InputError(f"{recording.name}: too short to diagnose")
-    bases = [start_bases(*poses(s.phi[s.keep], s.theta[s.keep], arms), shared) for s in signals]
+    bases = [start_bases(*_kept_poses(s, arms), shared) for s in signals]
     run = _processes(jobs)
     full = sensed is None or explained is not None  # causes may be errors of the signals
     linear = _linearised(run, signals, shared, bases, arms, reductions, full=full)
@@ -439,7 +451,7 @@ def what_noise_leaves(
 
 def exact_residual(signals: Signals, shared: Shared, bases: Bases, arms: Arms, reduction: Reduction) -> Array:
     force = balance(grasp_data(filtered(signals), arms, signals.rate_hz), shared)[0]
-    pose = pose_residual(signals.phi, signals.theta, shared, bases, arms)
+    pose = pose_residual(signals.phi, signals.theta, shared, bases, arms, signals.base)
     return reduction(np.concatenate([pose, force], axis=1))
 
 
@@ -479,5 +491,7 @@ def noise_rows(trial: TrialLinear, noise: Noise, rng: np.random.Generator) -> tu
     while some := list(islice(errors, draws_at_a_time(trial))):  # in batches, to limit memory
         phi, theta, tau = (np.array([getattr(e, kind) for e in some]) for kind in ("phi", "theta", "tau"))
         out.append(trial.of_all_signals(phi, theta, tau))
-    rows, signals = zip(*out, strict=True)
-    return np.concatenate(rows), np.concatenate(signals)
+    rows, signals = (np.concatenate(part) for part in zip(*out, strict=True))
+    if trial.signals.base is not None:
+        rows = rows + np.moveaxis(trial.of_bases(drifts(trial.signals, rng, len(rows))), -1, 0)
+    return rows, signals

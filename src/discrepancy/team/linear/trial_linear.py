@@ -22,6 +22,9 @@ from estimator.arm.design import OmnidDesign
 from estimator.arm.motion import COUNT, PHI, PHI_DDOT, PHI_DOT, TAU, THETA, with_its_rates
 from estimator.arm.unit import Arms, arm_of, design_of
 from estimator.arrays import Array
+from estimator.calibrate.driven import SCALES
+from estimator.calibrate.rows import scaled_paths
+from estimator.calibrate.rules import FLOOR_M
 from estimator.rigid_team import (
     Bases,
     BodyMotion,
@@ -311,6 +314,25 @@ class TrialLinear:
 
         return self.reduction.of_blocks(blocks(), self.channels)
 
+    def of_misreadings(self, robot: int, joint: int, pieces: Iterable[tuple[slice, Array]]) -> Patches:
+        """Residual rows caused by errors of one gimbal angle that last for an interval each.
+
+        Args:
+            robot, joint: indices from 0.
+            pieces: samples of each interval, and k columns of reading minus truth there [rad], shape (s, k).
+        """
+        reach, slots = math.ceil(SHIFT_REACH_S * self.signals.rate_hz), with_its_rates(THETA)
+
+        def blocks() -> Iterator[tuple[slice, Array]]:
+            for at, values in pieces:
+                near = slice(max(at.start - reach, 0), min(at.stop + reach, len(self.s)))
+                error = np.zeros((near.stop - near.start, values.shape[1]))
+                error[at.start - near.start : at.stop - near.start] = values
+                J = self.J.at(robot, slots, np.arange(near.start, near.stop))[:, :, joint::3]
+                yield near, np.einsum("scr,rsk->sck", J, self.signals.with_rates(error))
+
+        return self.reduction.of_blocks(blocks(), self.channels)
+
     def _displaced(self, robot: int, displacement: Array, at: slice) -> Array:
         """Residual samples (s, C, k) caused by displacements (s, 3, k) [m] in {b1}, for the samples ``at``."""
         out = np.zeros((len(displacement), self.channels, displacement.shape[2]))
@@ -346,6 +368,59 @@ class TrialLinear:
                 columns.append(self.of_signals(i, *rates))
                 columns.append(self.of_signals(i, *(rate * middle[:, None] for rate in rates)))
         return np.stack(columns, axis=2) if columns else np.zeros((*self.residual.shape, 0))
+
+    @property
+    def by_odometry(self) -> Array:
+        """Derivative by constants of driving bases, shape (n, C, 5 N): errors of scale in yaw, x and y, and tilt by
+        acceleration and by the moment of the load, as in ``estimator.calibrate.driven``."""
+        if self.signals.base is None:
+            return np.zeros((*self.residual.shape, 0))
+        Q, N = self.s.shape[:2]
+        errors = np.zeros((Q, N, 6, N, SCALES))
+        paths = scaled_paths(self.s[..., COUNT:], self.signals.rate_hz)
+        for i in range(N):
+            errors[:, i, 3:5, i, :3] = np.moveaxis(paths[:, i, :3, :2], 1, 2)
+            errors[:, i, 2, i, :3] = paths[:, i, :3, 2]
+            ahead = self.s[:, i, COUNT + 6 : COUNT + 8]
+            errors[:, i, 0, i, 3], errors[:, i, 1, i, 3] = -ahead[:, 1], ahead[:, 0]
+            R, force = self.data.R_bi[:, i], self.data.wrench[:, i, 3:]
+            moment = np.cross(self._lever(i), -np.einsum("qij,qj->qi", R, force))
+            errors[:, i, :2, i, 4] = moment[:, :2]
+        return self.of_bases(errors.reshape(Q, N, 6, -1))
+
+    def _lever(self, robot: int) -> Array:
+        """Wrist from the base's place on the floor, shape (Q, 3) [m]."""
+        place = self.s[:, robot, COUNT : COUNT + 3] * [1.0, 1.0, 0.0]
+        return self.data.p_bi[:, robot] - place - [0.0, 0.0, FLOOR_M]
+
+    def of_bases(self, errors: Array) -> Array:
+        """Residual rows of a change of the bases' poses, shape (n, C, k).
+
+        Args:
+            errors: rotation [rad] and displacement [m] of every base about its place on the floor, in its {b} at the
+                start, shape (Q, N, 6, k).
+        """
+        Q, N, _, k = errors.shape
+        out, shared = np.zeros((Q, self.channels, k)), self.shared
+        for i in range(N):
+            turn, lever = errors[:, i, :3], self._lever(i)
+            shift = errors[:, i, 3:] + np.cross(turn, lever[..., None], axis=1)
+            for j in range(1, N):
+                about, along = _channels(j)
+                if i == 0:
+                    grasp = self.data.R_bi[:, 0] @ shared.grasps.p_1i[j]
+                    out[:, about] -= turn
+                    out[:, along] -= shift + np.cross(turn, grasp[..., None], axis=1)
+                elif i == j:
+                    out[:, about] += self.bases.R[i] @ turn
+                    out[:, along] += self.bases.R[i] @ shift
+            out[:, -6:] += self._of_wrong_motion(i, self.bases.R[i] @ shift, slice(None))
+            up = np.cross(turn, [0.0, 0.0, 1.0], axisa=1, axisc=1)
+            up = shared.grasps.R_1i[i] @ np.swapaxes(self.data.R_bi[:, i], 1, 2) @ up
+            weight = self.data.gravity_mps2 / N * up
+            out[:, -6:-3] += shared.pi[0] * weight
+            out[:, -3:] += skew(shared.pi[1:4]) @ weight
+        return self.reduction(out)
 
     @cached_property
     def by_wrist(self) -> NDArray[np.float32]:
@@ -390,7 +465,7 @@ def linearise(
     """
     s = filtered(signals)
     data = grasp_data(s, arms, signals.rate_hz)
-    pose = pose_residual(signals.phi, signals.theta, shared, bases, arms)
+    pose = pose_residual(signals.phi, signals.theta, shared, bases, arms, signals.base)
     residual = reduction(np.concatenate([pose, balance(data, shared)[0]], axis=1))
     moved = np.zeros((*residual.shape, 0)) if known else reduction(by_shared(data, shared, bases))
     columns = moved, reduction(by_bases(data, shared, bases))
@@ -409,8 +484,12 @@ def with_derivatives(trial: TrialLinear) -> TrialLinear:
 
 
 def filtered(signals: Signals) -> Array:
-    """Filter the signals and arrange them in the slots of ``estimator.arm.motion``, shape (Q, N, 21)."""
+    """Filter the signals and arrange them in the slots of ``estimator.arm.motion``, shape (Q, N, 21).
+
+    Of driving bases, pose, rate and acceleration follow, shape (Q, N, 30).
+    """
     Q, N = signals.phi.shape[:2]
     angles = signals.with_rates(signals.phi), signals.with_rates(signals.theta)
-    parts = np.concatenate([*angles, signals.with_rates(signals.tau)[:1]])
-    return parts.transpose(1, 2, 0, 3).reshape(Q, N, COUNT)
+    base = [] if signals.base is None else [signals.with_rates(signals.base)]
+    parts = np.concatenate([*angles, signals.with_rates(signals.tau)[:1], *base])
+    return parts.transpose(1, 2, 0, 3).reshape(Q, N, -1)
