@@ -31,12 +31,16 @@ FAR = 100.0
 
 @dataclass(eq=False)
 class TrialRows:
-    """Rows of one trial and their sensors; ``adjustment`` is kept between evaluations."""
+    """Rows of one trial and their sensors.
+
+    ``fine_time`` are the instants of ``fine`` [s]; ``adjustment`` is kept between evaluations.
+    """
 
     name: str
     rows: Rows
-    sensing: Sensing
     units: ArmUnit
+    sensing: Sensing
+    fine_time: Array
     adjustment: Array | float = 0.0
     fine: ArmData = field(init=False)
     mean: Array = field(init=False)
@@ -131,6 +135,9 @@ def evaluate(point: Point, k: int, trial: TrialRows, *, derivatives: bool = True
             by_signals[:, C, i, slot] = (there[2] - q_s) / STEPS[slot]
     extended = covariance_of(by_signals, trial.noise)
     covariance = extended[:, :C, :C].copy()
+    if point.pair.joint.motion == "loose":  # the relative pose is free: weigh it by its own scatter
+        free = np.arange(C - 6, C)
+        covariance[:, free, free] += np.mean(r[:, free] ** 2, axis=0)
     misfit = np.mean(np.sum(r * np.linalg.solve(covariance, r[..., None])[..., 0], axis=1)) / C
     # Far from the solution, an adjustment would leave the linear range.
     trial.adjustment = adjustment_of(by_signals[:, :C], trial.noise, covariance, r) if misfit < FAR else 0.0
@@ -187,8 +194,10 @@ class Fitted:
     converged: bool
 
 
-def solve(point: Point, trials: Sequence[TrialRows]) -> Fitted:
+def solve(point: Point, trials: Sequence[TrialRows], *, gain: float = 0.0) -> Fitted:
     """Minimize the sum of squares from a starting point.
+
+    ``gain`` also ends the steps where one lowers chi2, over its mean per row, by no more than this.
 
     Raises:
         InputError: the equations are singular.
@@ -204,6 +213,7 @@ def solve(point: Point, trials: Sequence[TrialRows]) -> Fitted:
             dx, halvings = 0.5 * dx, halvings + 1
             point = last.moved(dx)
             continue
+        flat = lowest - value < gain * value / _count(at)
         lowest, halvings, last = value, 0, point
         scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
         scaled = H * np.outer(scale, scale)
@@ -211,7 +221,8 @@ def solve(point: Point, trials: Sequence[TrialRows]) -> Fitted:
         good = values > 1e-13 * values[-1]
         dx = -scale * (vectors[:, good] / values[good] @ (vectors[:, good].T @ (scale * g)))
         se = scale * np.sqrt(np.sum(vectors[:, good] ** 2 / values[good], axis=1))
-        if settled := bool(np.max(np.abs(dx) / se) < CONVERGED * max(1.0, np.sqrt(value / _count(at)))):
+        settled = bool(np.max(np.abs(dx) / se) < CONVERGED * max(1.0, np.sqrt(value / _count(at))))
+        if settled or flat:
             break
         point = point.moved(dx)
     scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))

@@ -41,6 +41,16 @@ def start(motion: Motion, halves: tuple[tuple[int, ...], tuple[int, ...]], trial
     return Pair(halves, R, p, joint, tuple(_bases(pair, trial) for trial in trials))
 
 
+def rigid_residual(poses: Poses, i: int, j: int) -> float:
+    """Return the rms of a rigid connection of two grasps: rotation [rad] and position [m], root of the sum of squares."""
+    A, B = _of(poses, i), _of(poses, j)
+    joint = _joint_start("rigid", A, B)
+    pair = Pair(((0,), (1,)), np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)), joint, ())
+    both = np.stack([A[0], B[0]], axis=1), np.stack([A[1], B[1]], axis=1)
+    left = pair.loops(*both, _bases(pair, both))[1].left
+    return float(np.sqrt(np.mean(np.sum(left**2, axis=1))))
+
+
 def _of(poses: Poses, robot: int) -> Poses:
     return poses[0][:, robot], poses[1][:, robot]
 
