@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from typing import Literal
 
 import numpy as np
-from scipy.stats import chi2 as chi2_of
 
 from estimator.calibrate import rules
 from estimator.errors import InputError
@@ -177,7 +176,7 @@ def _recording(recording: Recording, one: Evaluated) -> RecordingFit:
         count = part.residual.size
         ratio = normal([part], one.J.shape[2])[2] / count
         ratios.append(ratio)
-        if ratio > rules.MISFIT and chi2_of.sf(ratio * count, count) < 1e-4:
+        if ratio > max(rules.MISFIT, 1.0 + rules.MISFIT_SIGMAS * np.sqrt(2.0 / count)):
             flags.append(
                 f"{recording.name}: the {what} leave{'' if what == 'loops' else 's'} more than noise (chi2/n "
                 f"{ratio:.3g}); the true errors exceed the standard errors."

@@ -158,7 +158,7 @@ def evaluate(point: Point, k: int, trial: TrialRows, *, derivatives: bool = True
         if point.torques:
             raw = residual(point, k, mean, gravity)[1][:, balance]
             J[:, balance, of_pi] = shifted(rows(columns)[:, balance], adjusted[:, balance], raw)
-        for column in range(point.pair.size):
+        for column in point.pair.seen_by(k):
             x = np.zeros(point.size)
             x[column] = STEP
             there, back = point.moved(x), point.moved(-x)
@@ -213,7 +213,7 @@ def solve(point: Point, trials: Sequence[TrialRows], *, gain: float = 0.0) -> Fi
             dx, halvings = 0.5 * dx, halvings + 1
             point = last.moved(dx)
             continue
-        flat = lowest - value < gain * value / _count(at)
+        flat = gain > 0.0 and lowest - value < gain * value / _count(at)
         lowest, halvings, last = value, 0, point
         scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
         scaled = H * np.outer(scale, scale)

@@ -127,7 +127,9 @@ def _joint_start(motion: Motion, A: Poses, B: Poses) -> Joint:
 
     axis = beside(minimize(lambda x: left(beside(x))[0], np.zeros(2), method="Nelder-Mead").x)
     axes = _basis(axis * np.sign(axis[np.argmax(np.abs(axis))]))
-    return Joint(motion, R_0, left(axis)[1][3:], axes, np.zeros(3))
+    x = left(axes[:, 0])[1]
+    p_0 = x[3:] + axes[:, 0] * np.mean((seen + back @ x[:3] - x[3:]) @ axes[:, 0])  # zero in the middle
+    return Joint(motion, R_0, p_0, axes, np.zeros(3))
 
 
 def _basis(a: Array) -> Array:

@@ -157,6 +157,11 @@ class Pair:
         start = 6 * len(self.others)
         return slice(start, start + self.joint.size)
 
+    def seen_by(self, trial: int) -> list[int]:
+        """Unknowns that a trial depends on: all but the bases of other trials."""
+        each, start = 4 * (len(self.p) - 1), self.of_joint.stop
+        return [*range(start), *range(start + each * trial, start + each * (trial + 1))]
+
     def moved(self, x: Array) -> Pair:
         """Change all unknowns, shape (size,)."""
         R, p, at = self.R.copy(), self.p.copy(), self.of_joint
