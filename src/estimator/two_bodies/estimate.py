@@ -200,8 +200,12 @@ def _weak(fitted: Fitted) -> list[WeakDirection]:
     for value, vector in zip(values, vectors.T, strict=True):
         if value > WEAK**2:
             vector = vector * np.sign(vector[np.argmax(np.abs(vector))])
-            reason = f"the motion does not excite it (standard error {np.sqrt(value):.2g} of the payload's size)"
+            reason = (
+                f"the motion does not excite it (standard error {np.sqrt(value):.2g} of the payload's size)"
+            )
             out.append(
-                WeakDirection("inertial parameters", combination(vector, names), tuple(map(float, vector)), reason)
+                WeakDirection(
+                    "inertial parameters", combination(vector, names), tuple(map(float, vector)), reason
+                )
             )
     return out

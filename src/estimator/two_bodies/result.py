@@ -124,7 +124,9 @@ class TwoBodies:
     @property
     def joint(self) -> Joint:
         """The joint as the equations use it."""
-        return Joint(self.motion, self.R_0, self.p_0, self.axes, np.zeros(3) if self.pivot is None else self.pivot)
+        return Joint(
+            self.motion, self.R_0, self.p_0, self.axes, np.zeros(3) if self.pivot is None else self.pivot
+        )
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -272,7 +274,9 @@ class TwoBodies:
             InputError: the mapping is not an estimate of two bodies, or has another version.
         """
         if not isinstance(values, dict) or values.get("format") != FORMAT or values.get("version") != VERSION:
-            raise InputError(f"not an estimate of two bodies: it must have format {FORMAT!r} and version {VERSION}")
+            raise InputError(
+                f"not an estimate of two bodies: it must have format {FORMAT!r} and version {VERSION}"
+            )
         try:
             joint, told, grasps = values["joint"], values["parameters"], values["grasps"]
             zero, pivot = joint["zero"], joint["pivot_1_m"]
@@ -291,8 +295,12 @@ class TwoBodies:
                 **{key: joint[key] for key in ("q_low", "q_high", "q_rms")},
                 parameters=np.array(told["values"]),
                 covariance=np.array(told["covariance"]),
-                explained=tuple(Explained(**one | {"halves": _halves(one["halves"])}) for one in values["explained"]),
-                recordings=tuple(RecordingFit(**one | {"flags": tuple(one["flags"])}) for one in values["recordings"]),
+                explained=tuple(
+                    Explained(**one | {"halves": _halves(one["halves"])}) for one in values["explained"]
+                ),
+                recordings=tuple(
+                    RecordingFit(**one | {"flags": tuple(one["flags"])}) for one in values["recordings"]
+                ),
                 undetermined=tuple(
                     WeakDirection(one["step"], one["direction"], tuple(one["vector"]), one["reason"])
                     for one in values["undetermined"]
@@ -300,7 +308,9 @@ class TwoBodies:
                 flags=tuple(values["flags"]),
             )
         except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise InputError(f"not a complete estimate of two bodies ({type(error).__name__}: {error})") from error
+            raise InputError(
+                f"not a complete estimate of two bodies ({type(error).__name__}: {error})"
+            ) from error
 
 
 def _halves(values: Any) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -349,11 +359,15 @@ def format_two_bodies(found: TwoBodies, truth: dict[str, Any] | None = None) -> 
     count = len(found.recordings)
     hinged, turn = found.motion == "hinged", 180.0 / np.pi if found.motion == "hinged" else 1e3
     unit = "deg" if hinged else "mm"
-    lines = [f"[[Payload{label}: two bodies, {found.kind}]]  robots {said}, {count} recording{'s' * (count > 1)}"]
+    lines = [
+        f"[[Payload{label}: two bodies, {found.kind}]]  robots {said}, {count} recording{'s' * (count > 1)}"
+    ]
     lines += [f"    {found.why}"] if found.why else []
     lines += ["[[Joint, in {1}]]"]
     off = _axis_error(found, truth)
-    lines.append(f"    axis:         {_row(found.axes[:, 0])} +- {np.rad2deg(found.axis_se_rad):.2g} deg{off[0]}")
+    lines.append(
+        f"    axis:         {_row(found.axes[:, 0])} +- {np.rad2deg(found.axis_se_rad):.2g} deg{off[0]}"
+    )
     if found.pivot is not None and found.pivot_se_m is not None:
         lines.append(f"    through:      {_row(found.pivot)} m +- {1e3 * found.pivot_se_m:.2g} mm{off[1]}")
     lines.append(
@@ -440,4 +454,3 @@ def _line(name: str, value: float, se: float, unit: str, true: float | None) -> 
 
 def _row(values: Array) -> str:
     return "(" + ", ".join(f"{v:.4g}" for v in values) + ")"
-
