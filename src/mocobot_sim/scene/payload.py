@@ -1,7 +1,7 @@
 """MJCF of a payload, read from a file or generated: frame {1} and a site at every grasp.
 
-A payload is one rigid body ``payload``, or two bodies: ``payload``, which robot 1 holds, and its child ``second`` on one
-hinge or slide.
+A payload is one rigid body ``payload``, or two bodies: ``payload``, which robot 1 holds, and its child ``second`` on
+one hinge or slide.
 """
 
 from __future__ import annotations
@@ -168,7 +168,7 @@ def grasp_frames(payload_root: mjcf.RootElement, where: str) -> RigidTransform:
 
 
 def _check_bodies(model: mujoco.MjModel, grasps: list[int], where: str) -> None:
-    """Check that the body ``payload``, and ``second`` if it exists, have all the mass; the truth is read from them."""
+    """Check that ``payload``, and ``second`` if it exists, have all the mass; the truth is read from them."""
     body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "payload")
     if body < 0:
         raise InputError(f"{where}: the payload has no body 'payload'")
@@ -210,7 +210,9 @@ def _check_joint(model: mujoco.MjModel, body: int, second: int, grasps: list[int
     if model.body_parentid[second] != body:
         raise InputError(f"{where}: body {SECOND!r} is not a child of body 'payload'; it must be")
     if model.site_bodyid[grasps[0]] != body or second not in model.site_bodyid[grasps]:
-        raise InputError(f"{where}: body 'payload' must have grasp1, and body {SECOND!r} at least one other grasp")
+        raise InputError(
+            f"{where}: body 'payload' must have grasp1, and body {SECOND!r} at least one other grasp"
+        )
 
 
 def payload_mjcf(mass_kg: float, p_1c: Array, inertia_1: Array, X_1i: RigidTransform) -> mjcf.RootElement:

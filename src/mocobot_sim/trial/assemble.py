@@ -224,7 +224,9 @@ def _static_forces(
     spring = index.spring_dof.ravel()
     sprung = index.payload_dof[model.jnt_stiffness[model.dof_jntid[index.payload_dof]] > 0]
     # The floor carries released bases; their wheels settle in the first milliseconds of a trial.
-    apart = np.concatenate([index.motor_dof.ravel(), index.yielding_dof, index.hanging_dof, index.base_dof, sprung])
+    apart = np.concatenate(
+        [index.motor_dof.ravel(), index.yielding_dof, index.hanging_dof, index.base_dof, sprung]
+    )
     rows = np.setdiff1d(np.arange(model.nv), apart)
     jacobian = loop_jacobian(model, data)[0].T  # (nv, loops)
     constraint = jacobian[rows]

@@ -69,9 +69,7 @@ class Simulated:
     @cached_property
     def truth(self) -> GroundTruth:
         """Ground truth of payload and robots; compiles the model again."""
-        return replace(
-            GroundTruth.of(self.scene), control=self.log.stability, position=self.log.joint
-        )
+        return replace(GroundTruth.of(self.scene), control=self.log.stability, position=self.log.joint)
 
 
 def simulate(

@@ -121,7 +121,12 @@ class GroundTruth:
 
     @classmethod
     def _of_two(
-        cls, scene: TeamScene, model: mujoco.MjModel, data: mujoco.MjData, index: TeamIndex, joint: PayloadJoint
+        cls,
+        scene: TeamScene,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        index: TeamIndex,
+        joint: PayloadJoint,
     ) -> GroundTruth:
         ids = (index.payload_body, int(model.jnt_bodyid[joint.joint]))
         R_W, p_W = data.site_xmat[index.payload_site].reshape(-1, 3, 3), data.site_xpos[index.payload_site]
