@@ -76,7 +76,7 @@ def main(options: Options) -> None:
 
 @dataclass(frozen=True)
 class Scored:
-    """One trial: error over bound (rms) of axis, pivot, first and second body and joint; NEES and its count; CPU time."""
+    """One trial: rms error over bound of axis, pivot, first and second body and joint; NEES, its count; CPU time."""
 
     ratios: Array
     nees: float

@@ -6,14 +6,14 @@ format, version            "mocobot-two-bodies", 1
 payload, robots            label or null; N
 kind, motion               "hinged", "sliding" or "flexible"; "hinged" or "sliding"
 halves                     numbers of the robots that hold body A (robot 1 is of them) and body B
-joint                      axis_1 [3], axis_se_deg, pivot_1_m [3] and pivot_se_m (null if sliding), axes_1: columns (axis,
-                           y, z) in {1}; zero: {p_1k_m, R_1k_rotvec_deg}, pose of {k}, the grasp of B's first robot, at
-                           q = 0; q_low, q_high, q_rms [u]; terms: {damping, friction, stiffness, offset: {value, se}}
+joint                      axis_1 [3], axis_se_deg, pivot_1_m [3] and pivot_se_m (null if sliding), axes_1: columns
+                           (axis, y, z) in {1}; zero: {p_1k_m, R_1k_rotvec_deg}, pose of {k}, the grasp of B's first
+                           robot, at q = 0; q_low, q_high, q_rms [u]; terms: {damping, friction, stiffness, offset: {value, se}}
                            of the joint's force on B, -(damping q_dot + friction sign(q_dot) + stiffness q - offset)
 grasps                     list over robots of {robot, p_ki_m, R_ki_rotvec_deg} in the frame of its body, {1} or {k}
-parameters                 names, values, covariance: inertial parameters [kg, kg m, kg m^2] that the motion tells. A has
-                           ten about {1}, B those about the joint frame (axes_1 at q = 0, origin pivot or {k}) that the
-                           joint does not hide; A holds the hidden ones. Then the terms above
+parameters                 names, values, covariance: inertial parameters [kg, kg m, kg m^2] that the motion tells. A
+                           has ten about {1}, B those about the joint frame (axes_1 at q = 0, origin pivot or {k}) that
+                           the joint does not hide; A holds the hidden ones. Then the terms above
 whole                      both bodies with the joint at zero: {m_kg, m_se_kg, p_1c_m, p_1c_se_m, I_kgm2, I_se_kgm2}
 bodies                     null, or one physically consistent choice of what the joint hides: mass_B_range_kg [2] and A,
                            B: {m_kg, p_c_m, I_kgm2}, A in {1}, B in {1} at q = 0
@@ -174,7 +174,7 @@ class TwoBodies:
         return Body(*body_of(found[0])), Body(*body_of(T @ found[1] @ T.T)), found[2]
 
     def true_parameters(self, truth: dict[str, Any]) -> Array:
-        """Return the true values of ``parameters`` in this estimate's frames, from a truth file's ``bodies`` and ``joint``.
+        """Return the true values of ``parameters`` in this estimate's frames, from the content of a truth file.
 
         Raises:
             KeyError: the truth is not of two bodies.
@@ -346,7 +346,11 @@ UNITS = {
     "sliding": {"damping": "N s/m", "friction": "N", "stiffness": "N/m", "offset": "N"},
 }
 ABOUT_AXIS = {
-    "hinged": {"B.J_xx": ("J about the axis", "kg m^2"), "B.mc_y": ("m c_y from it", "kg m"), "B.mc_z": ("m c_z from it", "kg m")},
+    "hinged": {
+        "B.J_xx": ("J about the axis", "kg m^2"),
+        "B.mc_y": ("m c_y from it", "kg m"),
+        "B.mc_z": ("m c_z from it", "kg m"),
+    },
     "sliding": {"B.m": ("m", "kg")},
 }  # fmt: skip
 
@@ -393,11 +397,12 @@ def format_two_bodies(found: TwoBodies, truth: dict[str, Any] | None = None) -> 
     lines += [line(name, key, unit) for key, (name, unit) in ABOUT_AXIS[found.motion].items()]
     bodies = found.bodies
     if bodies is None:
-        lines.append("    no masses and inertias that real bodies can have move like this")
+        lines.append("    These values, without their errors, are of no two real bodies.")
     else:
         A, B, (low, high) = bodies
         hides = (
-            f"The joint hides how the mass divides: with {low:.2g} to {high:.2g} kg in the second, all moves alike. One:"
+            f"The joint hides how the mass divides: with {low:.2g} to {high:.2g} kg in the second, all moves "
+            "alike. One pair:"
             if hinged
             else "The joint hides how the inertia divides. One of the pairs that move alike:"
         )

@@ -42,7 +42,7 @@ def start(motion: Motion, halves: tuple[tuple[int, ...], tuple[int, ...]], trial
 
 
 def rigid_residual(poses: Poses, i: int, j: int) -> float:
-    """Return the rms of a rigid connection of two grasps: rotation [rad] and position [m], root of the sum of squares."""
+    """Return the rms of what a rigid connection of two grasps leaves: rotation [rad] and position [m] together."""
     A, B = _of(poses, i), _of(poses, j)
     joint = _joint_start("rigid", A, B)
     pair = Pair(((0,), (1,)), np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)), joint, ())

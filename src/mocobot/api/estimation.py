@@ -98,8 +98,8 @@ def estimate(
     """Estimate grasps, mass, centre of mass and inertia from recordings of one payload.
 
     The payload is one rigid body. If its option says so, or if ``"auto"`` finds that the robots do not hold one body
-    and a joint explains their motion, it is two bodies on a hinge or slide. ``why_not_fit`` of the estimate states why the method ``"auto"`` did not use the single fit. A calibration fixes
-    the parameters of the robots.
+    and a joint explains their motion, it is two bodies on a hinge or slide. ``why_not_fit`` of a rigid estimate states
+    why the method ``"auto"`` did not use the single fit. A calibration fixes the parameters of the robots.
 
     Args:
         logs: one or several recordings, or paths of recordings or of logs that ``convert`` reads without further

@@ -95,7 +95,7 @@ def test_the_split_is_of_real_bodies_that_need_the_same_forces(spring):
     assert low < SPRING.mass_B < high
     for body in (A, B):
         moments = np.linalg.eigvalsh(body.inertia)
-        assert 0 < moments[0]
+        assert moments[0] > 0
         assert moments[2] < moments[0] + moments[1]
     # At the estimate's joint zero B is turned by q, so A and B are put on a joint with its axis and pivot there.
     q = -spring.joint.coordinates(np.eye(3)[None], np.array([SPRING.grasps[1][:3]]))[0][0]
