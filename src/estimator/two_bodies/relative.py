@@ -6,8 +6,9 @@ coordinates of the relative pose vary). The closed loops of each candidate are f
     -1/2 sum over rows [r^T S^-1 r / s^2 + log det(2 pi s^2 S)] - n/2 [log(2 pi v) + 1] - K/2 log(n),
 
 the likelihood of the residuals r with sensor noise S and its scale s, of the free coordinate with its variance v
-(loose: log det of the covariance of six), and the Bayesian information criterion's price of the K unknowns (G.
-Schwarz, Annals of Statistics 6, 1978). Scale and variances are those of largest likelihood. All candidates explain the same loops.
+(loose: log det of the covariance of six), and the Bayesian information criterion's price of the K unknowns
+(G. Schwarz, Annals of Statistics 6, 1978). Scale and variances are those of largest likelihood. All candidates explain
+the same loops.
 """
 
 from __future__ import annotations

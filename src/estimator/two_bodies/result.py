@@ -6,14 +6,16 @@ format, version            "mocobot-two-bodies", 1
 payload, robots            label or null; N
 kind, motion               "hinged", "sliding" or "flexible"; "hinged" or "sliding"
 halves                     numbers of the robots that hold body A (robot 1 is of them) and body B
-joint                      axis_1 [3], axis_se_deg, pivot_1_m [3] and pivot_se_m (null if sliding), axes_1: columns
-                           (axis, y, z) in {1}; zero: {p_1k_m, R_1k_rotvec_deg}, pose of {k}, the grasp of B's first
-                           robot, at q = 0; q_low, q_high, q_rms [u]; terms: {damping, friction, stiffness, offset: {value, se}}
-                           of the joint's force on B, -(damping q_dot + friction sign(q_dot) + stiffness q - offset)
+joint                      axis_1 [3], axis_se_deg, pivot_1_m [3] and pivot_se_m (null if sliding)
+    axes_1                 columns (axis, y, z) in {1}, 3 x 3
+    zero                   {p_1k_m, R_1k_rotvec_deg}: pose of {k}, the grasp of B's first robot, at q = 0
+    q_low, q_high, q_rms   [u]
+    terms                  {damping, friction, stiffness, offset: {value, se}} of the joint's force on B,
+                           -(damping q_dot + friction sign(q_dot) + stiffness q - offset)
 grasps                     list over robots of {robot, p_ki_m, R_ki_rotvec_deg} in the frame of its body, {1} or {k}
-parameters                 names, values, covariance: inertial parameters [kg, kg m, kg m^2] that the motion tells. A
-                           has ten about {1}, B those about the joint frame (axes_1 at q = 0, origin pivot or {k}) that
-                           the joint does not hide; A holds the hidden ones. Then the terms above
+parameters                 names, values, covariance: inertial parameters [kg, kg m, kg m^2] that the motion tells, then
+                           the terms. A has ten about {1}, with all that the joint hides; B has the others, about the
+                           joint frame (axes_1 at q = 0, origin pivot or {k})
 whole                      both bodies with the joint at zero: {m_kg, m_se_kg, p_1c_m, p_1c_se_m, I_kgm2, I_se_kgm2}
 bodies                     null, or one physically consistent choice of what the joint hides: mass_B_range_kg [2] and A,
                            B: {m_kg, p_c_m, I_kgm2}, A in {1}, B in {1} at q = 0
