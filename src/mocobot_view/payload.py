@@ -194,7 +194,7 @@ def read_truth(recording: Path, robots: int, estimate: PayloadEstimate | None = 
     """Read the truth beside a simulated recording, in the frames of the estimate if one is given."""
     path = truth_path(recording)
     values = read_json(path, "the truth beside a simulated recording")
-    truth = Fields(values, TRUTH, str(path), optional=("as_built", "effects", "control"))
+    truth = Fields(values, TRUTH, str(path), optional=("as_built", "bodies", "joint", "effects", "control"))
     grasps = values["grasps"]
     if not isinstance(grasps, list) or len(grasps) != robots:
         count = len(grasps) if isinstance(grasps, list) else "no"

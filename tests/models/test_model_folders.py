@@ -10,8 +10,9 @@ import pytest
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
 FOLDERS = sorted(path for path in MODELS.iterdir() if path.is_dir())
-FOLDER_NAMES = ["emps", "omnid", "panda", "payload_a", "payload_b", "payload_c", "payload_d", "six_axis",
-                "team_a", "tx40", "xl330"]  # fmt: skip
+FOLDER_NAMES = ["emps", "omnid", "panda", "payload_a", "payload_b", "payload_c", "payload_d",
+                "payload_flexible", "payload_folding", "payload_hinged", "payload_sliding", "six_axis", "team_a",
+                "tx40", "xl330"]  # fmt: skip
 XML_FILES = sorted(MODELS.glob("**/*.xml"))
 NAMED = ("BODY", "JOINT", "GEOM", "SITE", "CAMERA", "LIGHT", "EQUALITY", "TENDON", "ACTUATOR", "SENSOR")
 NAMED_ASSETS = ("MATERIAL", "TEXTURE")

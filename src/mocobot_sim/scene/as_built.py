@@ -179,7 +179,9 @@ def deviate_geometry(omnid: mjcf.RootElement, unit: AsBuilt) -> None:
 
 NAMES = tuple(entry.name for entry in fields(AsBuilt))
 WRIST_MASS = "wrist_mass_ratio"
-PAYLOAD = ("grasps", "mass_kg", "p_1c_m", "R_1c_rotvec_deg", "principal_inertia_kgm2", "effects", "control")
+PAYLOAD = (
+    "grasps", "mass_kg", "p_1c_m", "R_1c_rotvec_deg", "principal_inertia_kgm2", "bodies", "joint", "effects", "control"
+)  # fmt: skip
 """Keys of the truth beside a recording that ``read_units`` ignores."""
 RANGES = {"_m": (-0.05, 0.05), "_ratio": (-0.9, 10.0)}
 """Allowed ranges of lengths and ratios by suffix, equal to those of the effects; zeros may be any number."""

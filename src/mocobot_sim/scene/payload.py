@@ -1,8 +1,13 @@
-"""MJCF of a payload, read from a file or generated: one rigid body with frame {1} and a site at every grasp."""
+"""MJCF of a payload, read from a file or generated: frame {1} and a site at every grasp.
+
+A payload is one rigid body ``payload``, or two bodies: ``payload``, which robot 1 holds, and its child ``second`` on
+one hinge or slide.
+"""
 
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +26,67 @@ OWN_COMPILER_SETTINGS = ("angle", "autolimits", "eulerseq", "assetdir", "meshdir
 # Top-level elements that a payload's file may have. All others would also affect the robots or act on the payload.
 OWN_ELEMENTS = ("asset", "compiler", "default", "statistic", "visual", "worldbody")
 GRASP = re.compile(r"grasp([0-9]+)")
+SECOND = "second"
+"""Name of the second body of a payload of two."""
+
+
+@dataclass(frozen=True)
+class PayloadJoint:
+    """Joint of a payload of two bodies, in the home pose, where its position is zero.
+
+    Attributes:
+        slides: whether the joint is a slide; otherwise a hinge.
+        axis_1: unit vector of the axis in {1}, shape (3,). The second body moves by +q along or about it.
+        pivot_1: point on the axis of a hinge in {1} [m], shape (3,).
+        stiffness: stiffness about the position ``rest`` [N m/rad or N/m]; 0 for a free joint.
+        damping: viscous damping [N m s/rad or N s/m].
+        rest: position at which the spring is relaxed [rad or m].
+        second: whether each robot holds the second body, N entries.
+        joint: id of the joint in the compiled model.
+    """
+
+    slides: bool
+    axis_1: Array
+    pivot_1: Array
+    stiffness: float
+    damping: float
+    rest: float
+    second: tuple[bool, ...]
+    joint: int
+
+    def moved(self, p_1i: Array, q: Array) -> Array:
+        """Positions of the grasps [m], shape (Q, N, 3), at joint positions [rad or m], shape (Q,).
+
+        They are in the axes of {1} in the home pose, from which each body moves by half of the joint's position.
+        """
+        moved = np.empty((len(q), len(p_1i), 3))
+        for i, p in enumerate(p_1i):
+            half = np.outer((0.5 if self.second[i] else -0.5) * q, self.axis_1)
+            arm = p - self.pivot_1
+            moved[:, i] = p + half if self.slides else self.pivot_1 + Rotation.from_rotvec(half).apply(arm)
+        return moved
+
+
+def payload_joint(model: mujoco.MjModel, prefix: str = "") -> PayloadJoint | None:
+    """Read the joint of a payload of two bodies from a compiled payload or team; None for a rigid payload."""
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, f"{prefix}{SECOND}")
+    if body < 0:
+        return None
+    data, joint = posed(model), int(model.body_jntadr[body])
+    first = model.site(f"{prefix}grasp1").id
+    R_1W, dof = data.site_xmat[first].reshape(3, 3).T, model.jnt_dofadr[joint]
+    grasps = [f"{prefix}grasp{n + 1}" for n in range(model.nsite)]
+    sites = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name) for name in grasps]
+    return PayloadJoint(
+        slides=bool(model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE),
+        axis_1=R_1W @ data.xaxis[joint],
+        pivot_1=R_1W @ (data.xanchor[joint] - data.site_xpos[first]),
+        stiffness=float(model.jnt_stiffness[joint]),
+        damping=float(model.dof_damping[dof]),
+        rest=float(model.qpos_spring[model.jnt_qposadr[joint]]),
+        second=tuple(bool(model.site_bodyid[site] == body) for site in sites if site >= 0),
+        joint=joint,
+    )
 
 
 def load_payload(payload: str | Path) -> mjcf.RootElement:
@@ -70,8 +136,8 @@ def grasp_frames(payload_root: mjcf.RootElement, where: str) -> RigidTransform:
     They are read from the compiled payload, so all orientation attributes of MJCF are supported.
 
     Raises:
-        InputError: MuJoCo cannot compile the payload, or it is not one rigid body ``payload`` with sites ``grasp1`` ..
-            ``graspN``, the first at its origin.
+        InputError: MuJoCo cannot compile the payload, or it is neither a rigid body ``payload`` with sites ``grasp1`` ..
+            ``graspN``, the first at its origin, nor two such bodies on a joint.
     """
     try:
         model = compiled(payload_root)
@@ -85,7 +151,7 @@ def grasp_frames(payload_root: mjcf.RootElement, where: str) -> RigidTransform:
         missing = next(n for n in range(1, len(numbers) + 2) if n not in numbers)
         raise InputError(f"{where}: the payload has no site 'grasp{missing}'; it needs grasp1 .. graspN")
     ids = [model.site(f"grasp{n}").id for n in numbers]
-    _check_rigid(model, where)
+    _check_bodies(model, ids, where)
     if not np.isfinite(data.site_xpos).all():
         raise InputError(f"{where}: the payload has a site whose position is not finite")
     if (
@@ -101,13 +167,20 @@ def grasp_frames(payload_root: mjcf.RootElement, where: str) -> RigidTransform:
     return X_Wi[0].inv() * X_Wi
 
 
-def _check_rigid(model: mujoco.MjModel, where: str) -> None:
-    """Check that one rigid body ``payload`` has all the mass; the ground truth is read from this body."""
+def _check_bodies(model: mujoco.MjModel, grasps: list[int], where: str) -> None:
+    """Check that ``payload``, and ``second`` if it exists, have all the mass; the truth is read from them."""
     body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "payload")
     if body < 0:
         raise InputError(f"{where}: the payload has no body 'payload'")
-    if model.njnt:
-        raise InputError(f"{where}: the payload has joints, {model.njnt} of them; it must be rigid")
+    second = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, SECOND)
+    if second < 0 and model.njnt:
+        raise InputError(
+            f"{where}: the payload has joints, {model.njnt} of them; it must be rigid or have its one joint in a body "
+            f"{SECOND!r}"
+        )
+    bodies = [body] if second < 0 else [body, second]
+    if second >= 0:
+        _check_joint(model, body, second, grasps, where)
     if model.body_mocapid[body] >= 0 or model.body_gravcomp.any():
         raise InputError(
             f"{where}: the payload must be free to move and have its weight: no mocap, no gravcomp"
@@ -115,13 +188,30 @@ def _check_rigid(model: mujoco.MjModel, where: str) -> None:
     if (model.geom_bodyid == 0).any():
         # Such a geom would be attached to robot 1's flange, and the ground truth would miss its mass.
         raise InputError(f"{where}: a geom stands in the world; all geoms must be in body 'payload'")
-    numbers = [*model.body_mass, *model.body_inertia[body], *model.body_ipos[body]]
+    numbers = [*model.body_mass, *model.body_inertia[bodies].ravel(), *model.body_ipos[bodies].ravel()]
     if not np.isfinite(numbers).all():
         raise InputError(f"{where}: the payload's mass, inertia or centre of mass is not finite")
-    if not model.body_mass[body] > 0 or model.body_mass.sum() != model.body_mass[body]:
+    if not (model.body_mass[bodies] > 0).all() or model.body_mass.sum() != model.body_mass[bodies].sum():
+        named = "body 'payload'" if second < 0 else f"bodies 'payload' and {SECOND!r}"
+        weights = " and ".join(f"{mass:g} kg" for mass in model.body_mass[bodies])
         raise InputError(
-            f"{where}: body 'payload' weighs {model.body_mass[body]:g} kg of {model.body_mass.sum():g} kg; "
-            "it must carry all the mass, and some"
+            f"{where}: {named} weighs {weights} of {model.body_mass.sum():g} kg; it must carry all the mass, and some"
+        )
+
+
+def _check_joint(model: mujoco.MjModel, body: int, second: int, grasps: list[int], where: str) -> None:
+    """Check that one hinge or slide connects the bodies, and that robots hold both."""
+    kinds = [mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE]
+    if model.njnt != 1 or model.body_jntnum[second] != 1 or not np.isin(model.jnt_type, kinds).all():
+        raise InputError(
+            f"{where}: the payload has {model.njnt} joints; a payload of two bodies has one hinge or slide, in body "
+            f"{SECOND!r}"
+        )
+    if model.body_parentid[second] != body:
+        raise InputError(f"{where}: body {SECOND!r} is not a child of body 'payload'; it must be")
+    if model.site_bodyid[grasps[0]] != body or second not in model.site_bodyid[grasps]:
+        raise InputError(
+            f"{where}: body 'payload' must have grasp1, and body {SECOND!r} at least one other grasp"
         )
 
 

@@ -18,9 +18,10 @@ from mocobot_sim.base.design import base_design
 from mocobot_sim.scene.as_built import AsBuilt, SensorEffects, deviate, units_of
 from mocobot_sim.scene.models import base_height_m, models_dir, omnid_design
 from mocobot_sim.scene.omnid import load_omnid, park, release, rough_floor, stand
-from mocobot_sim.scene.payload import grasp_frames, load_payload
+from mocobot_sim.scene.payload import PayloadJoint, grasp_frames, load_payload, payload_joint
 from mocobot_sim.scene.pymjcf import mjcf
 from mocobot_sim.scene.soft import STIFF, SoftRow, tune
+from mocobot_sim.scene.team_index import PAYLOAD_PREFIX
 
 TIMESTEP_S = 0.001
 """Default integration step [s]. Chosen."""
@@ -88,6 +89,10 @@ class TeamScene:
             return mujoco.MjModel.from_xml_string(self.to_xml(), assets)
         except ValueError as error:
             raise InputError(f"MuJoCo cannot compile the team ({' '.join(str(error).split())})") from error
+
+    def payload_joint(self) -> PayloadJoint | None:
+        """Read the joint of a payload of two bodies; None for a rigid payload or none."""
+        return payload_joint(self.compile(), PAYLOAD_PREFIX) if self.carries else None
 
     def sprung(self, equality: str, compliance: float, relaxation_s: float) -> TeamScene:
         """Return the scene with a spring at an ``equality`` of its tree; arguments as in ``SoftRow``."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from estimator.errors import InputError
 from mocobot_sim.base.design import WHEELS
 from mocobot_sim.scene.models import GIMBAL_AXES
+from mocobot_sim.scene.payload import payload_joint
 
 Index = NDArray[np.intp]
 
@@ -49,6 +50,7 @@ class TeamIndex:
     # slides and sprung hinges that effects have added: compliant, loose or moving bases and grasps
     yielding_dof: Index
     hanging_dof: Index  # other hinges that effects have added: pendulums in the payload
+    payload_dof: Index  # joint of a payload of two bodies; empty for a rigid one
     base_dof: Index  # free chassis, wheels and rollers; empty for a parked team
 
     @property
@@ -66,7 +68,9 @@ class TeamIndex:
         robots = robots_with(model, mujoco.mjtObj.mjOBJ_SITE, "grasp")
         joints = {kind: ids_of(model.joint, robots, names) for kind, names in JOINTS.items()}
         base = _base_joints(model)
-        own = np.concatenate([*(ids.ravel() for ids in joints.values()), base])
+        joint = payload_joint(model, PAYLOAD_PREFIX)
+        between = np.array([] if joint is None else [joint.joint], dtype=np.intp)
+        own = np.concatenate([*(ids.ravel() for ids in joints.values()), base, between])
         qpos = {
             f"{kind}_qpos": model.jnt_qposadr[joints[kind]].astype(np.intp)
             for kind in JOINTS
@@ -88,6 +92,7 @@ class TeamIndex:
             payload_body=model.body(f"{PAYLOAD_PREFIX}payload").id if carries else -1,
             yielding_dof=np.concatenate([slides, hinges[turning]]),
             hanging_dof=hinges[~turning],
+            payload_dof=model.jnt_dofadr[between].astype(np.intp),
             base_dof=np.flatnonzero(np.isin(model.dof_jntid, base)).astype(np.intp),
         )
 

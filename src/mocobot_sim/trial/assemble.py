@@ -147,6 +147,8 @@ def assemble_at_home(scene: TeamScene, model: mujoco.MjModel, data: mujoco.MjDat
         data.qpos[index.gimbal_qpos] = theta
         # Close the rods only: knees and platforms follow the driven angles.
         close(model, data, np.concatenate([index.knee_dof.ravel(), index.slide_dof.ravel()]), welds=False)
+        if index.payload_dof.size:
+            close(model, data, index.payload_dof)
     start = data.qpos.copy()
     _close_arms(model, data, index, arms, start)
     # Iterate, because compliant parts shift the loads.
@@ -201,6 +203,11 @@ def _settle(
         elif model.jnt_limited[joint] and abs(load[dof]) > 1e-3:
             data.qpos[model.jnt_qposadr[joint]] = model.jnt_range[joint, int(load[dof] > 0)]
             moved = True
+    for dof in index.payload_dof:
+        joint = model.dof_jntid[dof]
+        if model.jnt_stiffness[joint]:
+            data.qpos[model.jnt_qposadr[joint]] += load[dof] / model.jnt_stiffness[joint]
+            moved = True
     return moved
 
 
@@ -215,8 +222,11 @@ def _static_forces(
     """Static spring torques (N, 3) [N m], the largest unbalanced force [N or N m], and the load on every dof (nv,)."""
     needed: Array = static_load(model, data)
     spring = index.spring_dof.ravel()
+    sprung = index.payload_dof[model.jnt_stiffness[model.dof_jntid[index.payload_dof]] > 0]
     # The floor carries released bases; their wheels settle in the first milliseconds of a trial.
-    apart = np.concatenate([index.motor_dof.ravel(), index.yielding_dof, index.hanging_dof, index.base_dof])
+    apart = np.concatenate(
+        [index.motor_dof.ravel(), index.yielding_dof, index.hanging_dof, index.base_dof, sprung]
+    )
     rows = np.setdiff1d(np.arange(model.nv), apart)
     jacobian = loop_jacobian(model, data)[0].T  # (nv, loops)
     constraint = jacobian[rows]

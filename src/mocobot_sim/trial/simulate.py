@@ -73,7 +73,7 @@ class Simulated:
     @cached_property
     def truth(self) -> GroundTruth:
         """Ground truth of payload and robots; compiles the model again."""
-        return replace(GroundTruth.of(self.scene), control=self.log.stability)
+        return replace(GroundTruth.of(self.scene), control=self.log.stability, position=self.log.joint)
 
 
 def simulate(
@@ -209,6 +209,7 @@ def make_trajectory(
         return random_vias(home, rng, vias=request.vias)
     if request.trial == FREE:
         return free_motion(home, rng, vias=request.vias)
+    joint = scene.payload_joint()
     if request.trial == "periodic":
-        return sphere_motion(home, X_1i, duration_s=request.duration_s, rng=rng)
-    return static_orientations(home, X_1i)
+        return sphere_motion(home, X_1i, duration_s=request.duration_s, rng=rng, joint=joint)
+    return static_orientations(home, X_1i, joint=joint)

@@ -15,6 +15,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.arrays import Array
 from estimator.errors import InputError
+from mocobot_sim.scene.payload import PayloadJoint
 
 RATE_HZ = 100.0  # sampling rate of commands and recordings [Hz]
 LONGEST_S = 3600.0  # longest trial [s]; chosen: a trial and its log stay in memory
@@ -148,6 +149,7 @@ def sphere_motion(
     rng: np.random.Generator | None = None,
     amplitude_rad: float = np.deg2rad(3.4),
     frequency_hz: Sequence[float] = (0.7, 0.85, 0.6),
+    joint: PayloadJoint | None = None,
 ) -> Trajectory:
     """Periodic motion of all wrists on the sphere whose great circle passes through the grasps (paper, section IV.C.3).
 
@@ -161,6 +163,7 @@ def sphere_motion(
         rng: random generator for the phases; None for zero phases.
         amplitude_rad: amplitude of each component of the rotation vector [rad].
         frequency_hz: frequency of each component [Hz].
+        joint: joint of a payload of two bodies, which moves too; None for a rigid payload.
 
     Raises:
         InputError: the motion is shorter than its ramps or longer than an hour, or there is only one robot.
@@ -175,7 +178,9 @@ def sphere_motion(
     phase = np.zeros(3) if rng is None else rng.uniform(0.0, 2.0 * np.pi, 3)
     cycles = np.outer(time, np.asarray(frequency_hz))
     rotation = amplitude_rad * envelope[:, None] * np.sin(2.0 * np.pi * cycles + phase)
-    return Trajectory("periodic", _turn_about(wrist_home_b, X_1i, _circumcentre(X_1i.translation), rotation))
+    q = envelope * np.sin(2.0 * np.pi * JOINT_HZ * time)
+    centre = _circumcentre(X_1i.translation)
+    return Trajectory("periodic", _turn_about(wrist_home_b, X_1i, centre, rotation, joint, q))
 
 
 def static_orientations(
@@ -185,6 +190,7 @@ def static_orientations(
     tilt_rad: float = np.deg2rad(7.0),
     transit_s: float = 2.0,
     hold_s: float = 10.0,
+    joint: PayloadJoint | None = None,
 ) -> Trajectory:
     """Hold the payload still in orientations tilted about evenly spaced horizontal axes (paper, section IV.C.2).
 
@@ -195,6 +201,7 @@ def static_orientations(
         tilt_rad: tilt at each hold [rad].
         transit_s: time between holds [s].
         hold_s: time at each hold, settling included [s].
+        joint: joint of a payload of two bodies, which is held at several positions; None for a rigid payload.
 
     Raises:
         InputError: there is no orientation, or only one robot.
@@ -209,25 +216,45 @@ def static_orientations(
     time = np.arange(round(duration * RATE_HZ) + 1) / RATE_HZ - SETTLE_S
     steps = np.ones(orientations + 1)
     rotation = _via_path(time, stations, transit_s * steps, hold_s * steps, 0.0)
-    return Trajectory("static", _turn_about(wrist_home_b, X_1i, X_1i.translation.mean(axis=0), rotation))
+    positions = np.concatenate([[0.0], np.cos(2.0 * azimuth + 0.25 * np.pi), [0.0]])[:, None]
+    q = _via_path(time, positions, transit_s * steps, hold_s * steps, 0.0)[:, 0]
+    centre = X_1i.translation.mean(axis=0)
+    return Trajectory("static", _turn_about(wrist_home_b, X_1i, centre, rotation, joint, q))
 
 
-def _turn_about(wrist_home_b: Array, X_1i: RigidTransform, centre: Array, rotation: Array) -> Array:
+JOINT_HZ = 0.45
+"""Frequency of the joint of a payload of two bodies in a periodic trial [Hz]. Chosen."""
+JOINT_RAD, JOINT_M = 0.12, 0.05
+"""Amplitude of a hinge and of a slide of such a payload [rad, m]. Chosen."""
+
+
+def _turn_about(
+    wrist_home_b: Array,
+    X_1i: RigidTransform,
+    centre: Array,
+    rotation: Array,
+    joint: PayloadJoint | None = None,
+    q: Array | None = None,
+) -> Array:
     """Wrist positions in each {b} while the payload turns about a centre, shape (Q, N, 3).
 
-    ``rotation`` holds rotation vectors in the home axes of {1} [rad], shape (Q, 3); ``centre`` is in {1} [m].
+    ``rotation`` holds rotation vectors in the home axes of {1} [rad], shape (Q, 3); ``centre`` is in {1} [m]. The joint
+    of a payload of two bodies moves as ``q``, shape (Q,), times its amplitude.
     """
     if len(X_1i) < 2:
         raise InputError(
             "one robot cannot turn a payload about a point: periodic and static trials need two or more"
         )
     turn = Rotation.from_rotvec(rotation)
+    arms = None
+    if joint is not None and q is not None:
+        arms = joint.moved(X_1i.translation, q * (JOINT_M if joint.slides else JOINT_RAD)) - centre
     refs = []
-    for home, X in zip(np.asarray(wrist_home_b), X_1i, strict=True):
+    for i, (home, X) in enumerate(zip(np.asarray(wrist_home_b), X_1i, strict=True)):
         arm = X.translation - centre
         # At home, grasp frame i equals {b} of robot i up to tilt, so its yaw gives the heading of {b} in {1}.
         yaw = Rotation.from_euler("z", X.rotation.as_euler("ZYX")[0])
-        refs.append(home + yaw.inv().apply(turn.apply(arm) - arm))
+        refs.append(home + yaw.inv().apply(turn.apply(arm if arms is None else arms[:, i]) - arm))
     return np.stack(refs, axis=1)
 
 

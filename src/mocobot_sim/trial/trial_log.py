@@ -75,6 +75,7 @@ class TrialLog:
         weld_error_m: largest distance between a flange and its grasp [m].
         weld_error_rad: largest angle between a flange and its grasp [rad].
         stability: least damped mode of the control loop; None if bases drove or other actors took part.
+        joint: position of the joint of a payload of two bodies [rad or m], shape (Q,); None for a rigid payload.
     """
 
     trial: str
@@ -94,6 +95,7 @@ class TrialLog:
     weld_error_m: float
     weld_error_rad: float
     stability: Stability | None
+    joint: Array | None = None
 
     @property
     def robots(self) -> int:
@@ -232,7 +234,12 @@ class Rows:
             weld_error_m=float(weld.max()),
             weld_error_rad=float(angle.max()),
             stability=stability,
+            joint=self._joint(),
         )
+
+    def _joint(self) -> Array | None:
+        joints = self.model.dof_jntid[self.index.payload_dof]
+        return self.qpos[:, self.model.jnt_qposadr[joints[0]]] if len(joints) else None
 
 
 def _limit(name: str, values: Array, low: float, high: float, unit: str, when: Array, robot: int = 0) -> None:
