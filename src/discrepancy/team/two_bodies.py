@@ -18,6 +18,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from discrepancy.evidence.settings import SETTINGS
+from discrepancy.numbers import three_digits
 from discrepancy.result.folder import REPORT
 from discrepancy.result.json import plain
 from discrepancy.result.read import AS_FOUND, FORMAT, NAME, VERSION
@@ -57,7 +58,7 @@ Say = Callable[[str], object]
 
 
 def joint_of(found: Sequence[Candidate]) -> Candidate | None:
-    """Return the joint that the loops demand, from candidates with the best first; None if a rigid body explains them."""
+    """Return the joint that the loops demand, from candidates with the best first; None if one rigid body will do."""
     joint = next((one for one in found if one.axis is not None), None)
     rigid = next((one for one in found if one.motion == "rigid"), None)
     if joint is None or rigid is None:
@@ -119,8 +120,8 @@ class TwoBodyDiagnosed:
             "causes": [cause], "places": [], "suspected": [], "scatter": [], "foretold": None,
             "evidence": {"before": [self._candidate(one) for one in self.found], "after": None}, "gain": None,
             "not_simulated": "a rigid payload cannot follow these commands", "rollouts": None, "undecidable":
-            self._undecidable(), "detection_limits": [], "residual": None, "remains": self._remains(), "notes":
-            self._notes(),
+            self._undecidable(), "detection_limits": [], "residual": self._residual(),
+            "remains": self._remains(), "notes": self._notes(),
         })  # fmt: skip
 
     def _cause(self) -> dict[str, Any]:
@@ -132,7 +133,7 @@ class TwoBodyDiagnosed:
         own = self.found.index(j)
         rivals = [
             self._place(one) | {"probability": float(p), "evidence_gap": float(j.log_evidence - one.log_evidence),
-                                "chi2_per_n": None, "ambiguous": one is not j and j.log_evidence - one.log_evidence < 3.0,
+                                "chi2_per_n": None, "ambiguous": j.log_evidence - one.log_evidence < 3.0,
                                 "separate": SEPARATE}
             for one, p in zip(self.found, share, strict=True) if one is not j
         ]  # fmt: skip
@@ -208,6 +209,17 @@ class TwoBodyDiagnosed:
             spring = f", with a spring of {value:.3g} +- {se:.2g} {unit}"
         return f"The payload {line} between {first} and {second}{spring}; the joint moves by {size} (rms)."
 
+    def _residual(self) -> dict[str, Any]:
+        rigid = next(one for one in self.found if one.motion == "rigid")
+        says = [f"The loops of {word} leave {three_digits(one.noise)} times the encoders' noise."
+                for word, one in (("one rigid payload", rigid), ("two bodies on the joint", self.joint))]  # fmt: skip
+        before, after = rigid.noise**2, self.joint.noise**2
+        return {
+            "chi2_per_n": after, "chi2_per_n_tolerated": before, "unlisted_nats": 0.0,
+            "signature": {"chi2_per_n": after, "sentence": says[1]},
+            "nominal": {"chi2_per_n": before, "signature": {"chi2_per_n": before, "sentence": says[0]}},
+        }  # fmt: skip
+
     def _remains(self) -> list[str]:
         out = []
         if self.closes:
@@ -215,8 +227,8 @@ class TwoBodyDiagnosed:
                 1e3 * np.sqrt(np.mean(np.square(each))) for each in zip(*self.closes, strict=True)
             )
             out.append(
-                f"In trials left out of the fit the loops close within {after:.2g} mm with the joint, and {before:.2g} mm "
-                "without it."
+                f"In trials left out of the fit the loops close within {after:.2g} mm with the joint, and "
+                f"{before:.2g} mm without it."
             )
         return [
             *out,
@@ -246,10 +258,8 @@ class TwoBodyDiagnosed:
         return format_verdict(self.values)
 
     def verbose_text(self) -> str:
-        """Report with what cannot be decided and the notes."""
-        more = [f"Cannot be told apart: {one['what']}, because {one['why']}. To decide: {one['remedy']}."
-                for one in self.values["undecidable"]]  # fmt: skip
-        return "\n".join([str(self), "", self._sentence(), *more, *self.values["notes"]])
+        """Report with all details."""
+        return format_verdict(self.values, verbose=True)
 
     def write_into(self, folder: Path, *, pictures: bool = True, **more: Any) -> None:
         """Write JSON, report and, with an estimate, ``as_found/payload.xml`` into an existing folder.
@@ -264,7 +274,7 @@ class TwoBodyDiagnosed:
         write_text(folder / REPORT, f"{self.verbose_text()}\n")
 
 
-SEPARATE = "Mark both sides of the suspected joint, and look whether they move against each other while the robots do."
+SEPARATE = "mark both sides of the suspected joint, and look whether they move against each other"
 
 
 def as_found(estimate: TwoBodies) -> str | None:
@@ -286,9 +296,7 @@ def as_found(estimate: TwoBodies) -> str | None:
         damping=terms.get("damping", 0.0),
         rest=estimate.value("offset")[0] / stiffness if stiffness else 0.0, second=tuple(second), joint=-1,
     )  # fmt: skip
-    return two_body_mjcf(
-        [(b.mass, b.com, b.inertia) for b in bodies[:2]], joint, np.array(X_1i)
-    ).to_xml_string()
+    return two_body_mjcf([(b.mass, b.com, b.inertia) for b in bodies[:2]], joint, np.array(X_1i))
 
 
 def find_joint(recordings: Sequence[Recording], say: Say = lambda _: None) -> TwoBodyDiagnosed | None:

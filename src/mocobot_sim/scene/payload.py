@@ -139,8 +139,8 @@ def grasp_frames(payload_root: mjcf.RootElement, where: str) -> RigidTransform:
     They are read from the compiled payload, so all orientation attributes of MJCF are supported.
 
     Raises:
-        InputError: MuJoCo cannot compile the payload, or it is neither a rigid body ``payload`` with sites ``grasp1`` ..
-            ``graspN``, the first at its origin, nor two such bodies on a joint.
+        InputError: MuJoCo cannot compile the payload; or it is neither a rigid body ``payload`` with sites ``grasp1``
+            to ``graspN``, the first at its origin, nor two such bodies on a joint.
     """
     try:
         model = compiled(payload_root)
@@ -259,10 +259,8 @@ def payload_mjcf(mass_kg: float, p_1c: Array, inertia_1: Array, X_1i: RigidTrans
     return root
 
 
-def two_body_mjcf(
-    bodies: Sequence[tuple[float, Array, Array]], joint: PayloadJoint, X_1i: Array
-) -> mjcf.RootElement:
-    """Generate the MJCF of a payload of two bodies.
+def two_body_mjcf(bodies: Sequence[tuple[float, Array, Array]], joint: PayloadJoint, X_1i: Array) -> str:
+    """Generate the MJCF document of a payload of two bodies.
 
     Args:
         bodies: mass [kg], centre of mass in {1} [m], shape (3,), and inertia about it in the axes of {1} [kg m^2],
@@ -308,7 +306,8 @@ def two_body_mjcf(
                 rgba=COLOURS[side],
                 **look,
             )
-    return root
+    # PyMJCF cannot read the root default class that it writes.
+    return re.sub(r'<default>\s*<default class="/"/>\s*</default>\s*| class="/"', "", root.to_xml_string())
 
 
 def nearest_inertia(inertia: Array, least_ratio: float) -> Array:
