@@ -53,7 +53,9 @@ KIND = {"folding": "hinged"}
 
 def main(options: Options) -> None:
     """Print one line for each payload."""
-    print("| payload | trials | axis | pivot | first body | second body | joint | NEES (99 % band) | CPU [s] |")
+    print(
+        "| payload | trials | axis | pivot | first body | second body | joint | NEES (99 % band) | CPU [s] |"
+    )
     print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     for payload in options.payloads:
         squares: list[Array] = []
@@ -74,7 +76,7 @@ def main(options: Options) -> None:
 
 @dataclass(frozen=True)
 class Scored:
-    """One trial: error over bound (rms) of axis, pivot, first and second body and joint; NEES and its count; CPU time."""
+    """One trial: rms error over bound of axis, pivot, first and second body and joint; NEES, its count; CPU time."""
 
     ratios: Array
     nees: float
@@ -138,7 +140,9 @@ def least_covariance(quiet: Recording, fitted: Fitted, sigma: Array) -> Array:
     still = np.zeros((labels.robots, 9))
     H = np.zeros((fitted.point.size,) * 2)
     for rows in _instants(quiet, 500):
-        samples = TrialRows("quiet", rows, units, Sensing(still, np.tile(sigma, (labels.robots, 1))), rows.time)
+        samples = TrialRows(
+            "quiet", rows, units, Sensing(still, np.tile(sigma, (labels.robots, 1))), rows.time
+        )
         H += STRIDE * normal([evaluate(fitted.point, 0, samples)], fitted.point.size)[0]
     scale = 1.0 / np.sqrt(np.diag(H))
     return np.linalg.inv(H * np.outer(scale, scale)) * np.outer(scale, scale)

@@ -26,6 +26,7 @@ from mocobot.api.diagnosis import Cause as Cause
 from mocobot.api.diagnosis import Diagnosis as Diagnosis
 from mocobot.api.diagnosis import diagnose as diagnose
 from mocobot.api.estimation import Estimate as Estimate
+from mocobot.api.estimation import TwoBodyEstimate as TwoBodyEstimate
 from mocobot.api.estimation import estimate as estimate
 from mocobot.api.estimation import read_estimate as read_estimate
 from mocobot.api.inspection import Inspection as Inspection

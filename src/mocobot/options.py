@@ -62,6 +62,9 @@ class EstimateOptions(Options):
     calibration: Calibrated = None
     self_calibrate: Flag = False
     """Calibrate the robots and estimate the payload in one fit of these recordings, which may include free trials."""
+    payload: Literal["auto", "rigid", "hinged", "sliding", "flexible"] = "auto"
+    """Kind of payload: one rigid body, or two on a hinge (hinged), a slide (sliding) or a joint with a spring
+    (flexible). auto: rigid, or two bodies if the robots do not move like one."""
     method: Literal["auto", "fit", "staged", "joint"] = "auto"
     """How to estimate. fit: one fit of loop closure and wrench balance. staged: the method of the paper. joint: the
     grasps of the paper, then one least squares. auto: the fit, if it leaves only noise."""
@@ -74,6 +77,13 @@ class EstimateOptions(Options):
             named = {"calibration": self.calibration is not None, "method": self.method != "auto"}
             for name in (name for name, given in named.items() if given):
                 raise InputError(f"self_calibrate and {name} are both given; choose one")
+        if self.payload not in ("auto", "rigid"):
+            if self.self_calibrate:
+                raise InputError(f"self_calibrate is of a rigid payload, and payload is {self.payload!r}")
+            if self.method != "auto":
+                raise InputError(
+                    f"method {self.method!r} is of a rigid payload, and payload is {self.payload!r}"
+                )
 
 
 @dataclass(frozen=True, kw_only=True)

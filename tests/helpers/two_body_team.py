@@ -6,7 +6,7 @@ wrench and the joint's force. The robots' forces are the least that give these s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
@@ -21,16 +21,14 @@ from recordings import metadata
 from synthetic_team import HOME
 
 TURN = Rotation.from_rotvec([0.3, -0.2, 0.5]).as_matrix()
-I_A = TURN @ np.diag([0.05, 0.12, 0.15]) @ TURN.T
-I_B = TURN.T @ np.diag([0.5, 0.7, 1.1]) @ TURN
 
 
 @dataclass(frozen=True)
 class TwoBodies:
     """Two bodies in {1} at joint zero.
 
-    ``kind`` is hinge, slide or weld. Centres of mass and pivot are in {1}, inertias about the centres of mass. ``grasps``
-    are (R, p) in {1} at joint zero, for the robots of ``halves``.
+    ``kind`` is hinge, slide or weld. Centres of mass and pivot are in {1}, inertias about the centres of mass.
+    ``grasps`` are (x, y, z, yaw in degrees) in {1} at joint zero.
     """
 
     kind: str = "hinge"
@@ -40,6 +38,8 @@ class TwoBodies:
     com_A: tuple[float, float, float] = (0.23, 0.1, 0.1)
     mass_B: float = 6.9
     com_B: tuple[float, float, float] = (0.8, 0.15, 0.1)
+    I_A: np.ndarray = field(default_factory=lambda: TURN @ np.diag([0.05, 0.12, 0.15]) @ TURN.T)
+    I_B: np.ndarray = field(default_factory=lambda: TURN.T @ np.diag([0.5, 0.7, 1.1]) @ TURN)
     damping: float = 0.06
     stiffness: float = 0.0
     rest: float = 0.0
@@ -52,8 +52,8 @@ class TwoBodies:
     def model(self) -> mujoco.MjModel:
         """The MuJoCo model; B's frame has its origin in that of A at joint zero."""
 
-        def body(name: str, m: float, com, I: np.ndarray) -> str:
-            full = f"{I[0, 0]} {I[1, 1]} {I[2, 2]} {I[0, 1]} {I[0, 2]} {I[1, 2]}"
+        def body(name: str, m: float, com, at: np.ndarray) -> str:
+            full = f"{at[0, 0]} {at[1, 1]} {at[2, 2]} {at[0, 1]} {at[0, 2]} {at[1, 2]}"
             return f'<inertial mass="{m}" pos="{com[0]} {com[1]} {com[2]}" fullinertia="{full}"/>'
 
         a, c = (" ".join(map(str, v)) for v in (self.axis, self.pivot))
@@ -63,8 +63,47 @@ class TwoBodies:
         )  # fmt: skip
         return mujoco.MjModel.from_xml_string(f"""<mujoco><compiler angle="radian"/>
             <option gravity="0 0 -{DESIGN.gravity_mps2}"/><worldbody>
-            <body><freejoint/>{body("A", self.mass_A, self.com_A, I_A)}
-            <body>{joint}{body("B", self.mass_B, self.com_B, I_B)}</body></body></worldbody></mujoco>""")
+            <body><freejoint/>{body("A", self.mass_A, self.com_A, self.I_A)}
+            <body>{joint}{body("B", self.mass_B, self.com_B, self.I_B)}</body></body></worldbody></mujoco>""")
+
+    @property
+    def truth(self) -> dict:
+        """The keys of a truth file."""
+        a = np.array(self.axis) / np.linalg.norm(self.axis)
+        turned = [Rotation.from_euler("z", yaw, degrees=True) for *_, yaw in self.grasps]
+        places = [np.array(p) for *p, _ in self.grasps]
+        bodies = []
+        for half, m, com, at in (
+            (self.halves[0], self.mass_A, self.com_A, self.I_A),
+            (self.halves[1], self.mass_B, self.com_B, self.I_B),
+        ):
+            back = turned[half[0]].as_matrix().T
+            bodies.append({
+                "robots": [i + 1 for i in half], "mass_kg": m,
+                "p_kc_m": (back @ (np.array(com) - places[half[0]])).tolist(),
+                "inertia_k_kgm2": (back @ at @ back.T).tolist(),
+            })  # fmt: skip
+        unit = "Nm_per_rad" if self.kind == "hinge" else "N_per_m"
+        joint = {
+            "axis_1": a.tolist(), "pivot_1_m": list(self.pivot), f"stiffness_{unit}": float(self.stiffness),
+            "damping_N": float(self.damping), "rest_rad" if self.kind == "hinge" else "rest_m": self.rest,
+        }  # fmt: skip
+        grasps = [
+            {"p_1i_m": p.tolist(), "R_1i_rotvec_deg": np.rad2deg(R.as_rotvec()).tolist()}
+            for p, R in zip(places, turned, strict=True)
+        ]
+        return {"bodies": bodies, "joint": joint, "grasps": grasps}
+
+    def needed(self, qpos: np.ndarray, qvel: np.ndarray, qacc: np.ndarray) -> np.ndarray:
+        """Generalized forces that a motion needs according to MuJoCo, shape (Q, 7), or (Q, 6) welded."""
+        model = self.model
+        data, out = mujoco.MjData(model), np.zeros((len(qpos), model.nv))
+        for k in range(len(qpos)):
+            data.qpos[:], data.qvel[:], data.qacc[:] = (x[k, : len(y)] for x, y in (
+                (qpos, data.qpos), (qvel, data.qvel), (qacc, data.qacc)))  # fmt: skip
+            mujoco.mj_inverse(model, data)
+            out[k] = data.qfrc_inverse
+        return out
 
 
 def carried(
@@ -84,22 +123,21 @@ def carried(
     R_W = as_matrix("xyz", x[..., :3])
     middle = np.mean(bodies.grasps, axis=0)[:3]  # all robots move alike
     p_W = x[..., 3:] + middle - R_W @ middle
-    model = bodies.model
-    data = mujoco.MjData(model)
     # Rates: world velocity of the origin, angular velocity in {1}.
     R, R_dot, R_ddot = derivatives(R_W)
-    spin, faster = np.swapaxes(R, 1, 2) @ R_dot, np.swapaxes(R, 1, 2) @ R_ddot + np.swapaxes(R_dot, 1, 2) @ R_dot
+    spin, faster = (
+        np.swapaxes(R, 1, 2) @ R_dot,
+        np.swapaxes(R, 1, 2) @ R_ddot + np.swapaxes(R_dot, 1, 2) @ R_dot,
+    )
     w, alpha = (np.stack([A[:, 2, 1], A[:, 0, 2], A[:, 1, 0]], axis=1) for A in (spin, faster))
     p, q0 = derivatives(p_W), derivatives(q)
     needed = np.zeros((len(time), 7))
     quat = np.roll(Rotation.from_matrix(R).as_quat(), 1, axis=1)
-    for k in range(len(time)):
-        data.qpos[:7] = *p[0][k], *quat[k]
-        data.qvel[:6], data.qacc[:6] = (*p[1][k], *w[k]), (*p[2][k], *alpha[k])
-        if bodies.kind != "weld":
-            data.qpos[7], data.qvel[6], data.qacc[6] = (part[k] for part in q0)
-        mujoco.mj_inverse(model, data)
-        needed[k, : model.nv] = data.qfrc_inverse
+    along = [part[:, None] for part in q0]
+    found = bodies.needed(
+        np.hstack([p[0], quat, along[0]]), np.hstack([p[1], w, along[1]]), np.hstack([p[2], alpha, along[2]])
+    )
+    needed[:, : found.shape[1]] = found
     force, moment = np.einsum("qji,qj->qi", R, needed[:, :3]), needed[:, 3:6]
 
     a = np.array(bodies.axis) / np.linalg.norm(bodies.axis)
@@ -118,7 +156,9 @@ def carried(
         off = Rotation.from_euler("z", rng.uniform(-0.1, 0.1)).as_matrix() @ R_i
         off = off if i else np.eye(3)
         R_bi = off.T @ R_W @ turn @ R_i
-        h = (p_W + (R_W @ shift[..., None])[..., 0] - p_i - rng.uniform(-0.02, 0.02, 3) * (i > 0)) @ off + HOME
+        h = (
+            p_W + (R_W @ shift[..., None])[..., 0] - p_i - rng.uniform(-0.02, 0.02, 3) * (i > 0)
+        ) @ off + HOME
         theta = Rotation.from_matrix(R_bi.reshape(-1, 3, 3)).as_euler("ZYX").reshape(h.shape)
         motion.append(derivatives(np.concatenate([inverse_kinematics(h, DESIGN), theta], axis=-1)))
         arms.append(turn[:, 4] @ R_i)

@@ -28,6 +28,8 @@ NOT_RIGID_ERROR = 0.5
 NOT_RIGID_FLAG = 0.1
 """Residual of a pair's twists relative to their motion, above which to report an error (not one rigid body) or a flag.
 """
+NOT_ONE_BODY = "do not move like one rigid body"
+"""Words of these errors and flags."""
 ANGLE_TOLERANCE_RAD = np.deg2rad(5.0)
 POSITION_TOLERANCE = 0.05
 """Disagreement of two recordings' grasps [m, and per m of distance] above which calibration errors do not explain it.
@@ -101,7 +103,7 @@ def check_rigid(name: str, grasps: GraspEstimate) -> list[str]:
             grasps.linear_residual_rms[i, j] / linear if linear else 0.0,
         )
         what = (
-            f"{name}: robots {i + 1} and {j + 1} do not move like one rigid body "
+            f"{name}: robots {i + 1} and {j + 1} {NOT_ONE_BODY} "
             f"({100 * ratio:.0f} % of their motion is unexplained)"
         )
         if ratio > NOT_RIGID_ERROR:
@@ -122,7 +124,7 @@ def check_disagreement_is_noise(name: str, steps: Sequence[StepReport]) -> None:
         if step.noise > limit:
             robot = step.step.split("_1")[1]
             raise InputError(
-                f"{name}: robots 1 and {robot} do not move like one rigid body (they disagree by "
+                f"{name}: robots 1 and {robot} {NOT_ONE_BODY} (they disagree by "
                 f"{step.noise:.2g} {step.unit.split(' per')[0]} rms); check their columns and units"
             )
 

@@ -28,8 +28,7 @@ KINDS: dict[Kind, tuple[Motion, ...]] = {
 MOST_AXIS_RAD = float(np.deg2rad(5.0))
 """Standard error of the axis above which an estimate is refused. Chosen."""
 EXPLAINED = 3.0
-"""Residual of the loops over the sensors' noise above which a joint does not explain them. Chosen, as for rigid payloads.
-"""
+"""Residual of the loops over the noise above which a joint does not explain them. Chosen, as for rigid payloads."""
 WEAK = 1.0 / 3.0
 """Standard error of a combination of parameters, over the payload's size, above which it is not determined. Chosen."""
 
@@ -200,8 +199,12 @@ def _weak(fitted: Fitted) -> list[WeakDirection]:
     for value, vector in zip(values, vectors.T, strict=True):
         if value > WEAK**2:
             vector = vector * np.sign(vector[np.argmax(np.abs(vector))])
-            reason = f"the motion does not excite it (standard error {np.sqrt(value):.2g} of the payload's size)"
+            reason = (
+                f"the motion does not excite it (standard error {np.sqrt(value):.2g} of the payload's size)"
+            )
             out.append(
-                WeakDirection("inertial parameters", combination(vector, names), tuple(map(float, vector)), reason)
+                WeakDirection(
+                    "inertial parameters", combination(vector, names), tuple(map(float, vector)), reason
+                )
             )
     return out

@@ -164,7 +164,9 @@ def evaluate(point: Point, k: int, trial: TrialRows, *, derivatives: bool = True
             there, back = point.moved(x), point.moved(-x)
 
             def slope(data: ArmData, there: Point = there, back: Point = back) -> Array:
-                return (residual(there, k, data, gravity)[0] - residual(back, k, data, gravity)[0]) / (2.0 * STEP)
+                return (residual(there, k, data, gravity)[0] - residual(back, k, data, gravity)[0]) / (
+                    2.0 * STEP
+                )
 
             J[..., column] = rows(slope(trial.fine))
             if point.torques:
@@ -241,7 +243,9 @@ def normal(at: Sequence[Evaluated], size: int) -> tuple[Array, Array, float]:
     H, g, value = np.zeros((size, size)), np.zeros(size), 0.0
     for one in at:
         L = np.linalg.cholesky(one.covariance)
-        white = np.linalg.solve(L, np.concatenate([one.J, one.residual[..., None]], axis=2)).reshape(-1, size + 1)
+        white = np.linalg.solve(L, np.concatenate([one.J, one.residual[..., None]], axis=2)).reshape(
+            -1, size + 1
+        )
         gram = white.T @ white
         H, g, value = H + gram[:-1, :-1], g + gram[:-1, -1], value + float(gram[-1, -1])
     return H, g, value

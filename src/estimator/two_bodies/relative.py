@@ -5,9 +5,10 @@ coordinates of the relative pose vary). The closed loops of each candidate are f
 
     -1/2 sum over rows [r^T S^-1 r / s^2 + log det(2 pi s^2 S)] - n/2 [log(2 pi v) + 1] - K/2 log(n),
 
-the likelihood of the residuals r with sensor noise S and its scale s, of the free coordinate with its variance v (loose:
-log det of the covariance of six), and the Bayesian information criterion's price of the K unknowns (G. Schwarz, Annals
-of Statistics 6, 1978). Scale and variances are those of largest likelihood. All candidates explain the same loops.
+the likelihood of the residuals r with sensor noise S and its scale s, of the free coordinate with its variance v
+(loose: log det of the covariance of six), and the Bayesian information criterion's price of the K unknowns
+(G. Schwarz, Annals of Statistics 6, 1978). Scale and variances are those of largest likelihood. All candidates explain
+the same loops.
 """
 
 from __future__ import annotations
@@ -78,20 +79,23 @@ def trial_rows(recordings: Sequence[Recording]) -> list[TrialRows]:
     Raises:
         InputError: a recording is unusable or too short, or the numbers of robots differ.
     """
-    out = []
     for recording in recordings:
         check_recording(recording)
         check_duration(recording, rules.TRIM_S)
+    sensing = Sensing.of_each([Resolution.of(recording) for recording in recordings])
+    out = []
+    for recording, seen in zip(recordings, sensing, strict=True):
         rows, labels = Rows.of(recording), recording.metadata
         if len(rows.time) < LEAST_ROWS:
             raise InputError(f"{recording.name}: too short for two bodies; 10 s of motion are the least")
         if labels.robots != recordings[0].metadata.robots:
-            raise InputError(f"{recording.name}: {labels.robots} robots; {recordings[0].name} has another number")
+            raise InputError(
+                f"{recording.name}: {labels.robots} robots; {recordings[0].name} has another number"
+            )
         units = labels.units or ArmUnit(labels.design, np.zeros((labels.robots, COUNT)))
         stride = max(1, round(labels.rate_hz / rules.SAMPLE_HZ))
-        out.append((recording.name, rows, units, recording.time[::stride]))
-    sensing = Sensing.of_each([Resolution.of(recording) for recording in recordings])
-    return [TrialRows(*one[:3], seen, one[3]) for one, seen in zip(out, sensing, strict=True)]
+        out.append(TrialRows(recording.name, rows, units, seen, recording.time[::stride]))
+    return out
 
 
 def relative_motion(
@@ -150,11 +154,15 @@ def _divisions(poses: Sequence[Poses], robots: int) -> list[tuple[tuple[int, ...
     for i, j in combinations(range(robots), 2):
         apart[i, j] = max(rigid_residual(one, i, j) for one in poses)
     every = halves_of(robots)
-    worst = [max((apart[i, j] for half in one for i, j in combinations(half, 2)), default=0.0) for one in every]
+    worst = [
+        max((apart[i, j] for half in one for i, j in combinations(half, 2)), default=0.0) for one in every
+    ]
     return [one for one, left in zip(every, worst, strict=True) if left <= NEAR * min(worst) or left < 1e-6]
 
 
-def _candidate(motion: Motion, halves: Halves, trials: Sequence[TrialRows], poses: Sequence[Poses]) -> Candidate:
+def _candidate(
+    motion: Motion, halves: Halves, trials: Sequence[TrialRows], poses: Sequence[Poses]
+) -> Candidate:
     for trial in trials:
         trial.adjustment = 0.0
     fitted = solve(Point(start(motion, halves, poses), np.zeros(0)), trials, gain=1.0)

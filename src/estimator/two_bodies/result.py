@@ -6,14 +6,16 @@ format, version            "mocobot-two-bodies", 1
 payload, robots            label or null; N
 kind, motion               "hinged", "sliding" or "flexible"; "hinged" or "sliding"
 halves                     numbers of the robots that hold body A (robot 1 is of them) and body B
-joint                      axis_1 [3], axis_se_deg, pivot_1_m [3] and pivot_se_m (null if sliding), axes_1: columns (axis,
-                           y, z) in {1}; zero: {p_1k_m, R_1k_rotvec_deg}, pose of {k}, the grasp of B's first robot, at
-                           q = 0; q_low, q_high, q_rms [u]; terms: {damping, friction, stiffness, offset: {value, se}}
-                           of the joint's force on B, -(damping q_dot + friction sign(q_dot) + stiffness q - offset)
+joint                      axis_1 [3], axis_se_deg, pivot_1_m [3] and pivot_se_m (null if sliding)
+    axes_1                 columns (axis, y, z) in {1}, 3 x 3
+    zero                   {p_1k_m, R_1k_rotvec_deg}: pose of {k}, the grasp of B's first robot, at q = 0
+    q_low, q_high, q_rms   [u]
+    terms                  {damping, friction, stiffness, offset: {value, se}} of the joint's force on B,
+                           -(damping q_dot + friction sign(q_dot) + stiffness q - offset)
 grasps                     list over robots of {robot, p_ki_m, R_ki_rotvec_deg} in the frame of its body, {1} or {k}
-parameters                 names, values, covariance: inertial parameters [kg, kg m, kg m^2] that the motion tells. A has
-                           ten about {1}, B those about the joint frame (axes_1 at q = 0, origin pivot or {k}) that the
-                           joint does not hide; A holds the hidden ones. Then the terms above
+parameters                 names, values, covariance: inertial parameters [kg, kg m, kg m^2] that the motion tells, then
+                           the terms. A has ten about {1}, with all that the joint hides; B has the others, about the
+                           joint frame (axes_1 at q = 0, origin pivot or {k})
 whole                      both bodies with the joint at zero: {m_kg, m_se_kg, p_1c_m, p_1c_se_m, I_kgm2, I_se_kgm2}
 bodies                     null, or one physically consistent choice of what the joint hides: mass_B_range_kg [2] and A,
                            B: {m_kg, p_c_m, I_kgm2}, A in {1}, B in {1} at q = 0
@@ -124,7 +126,9 @@ class TwoBodies:
     @property
     def joint(self) -> Joint:
         """The joint as the equations use it."""
-        return Joint(self.motion, self.R_0, self.p_0, self.axes, np.zeros(3) if self.pivot is None else self.pivot)
+        return Joint(
+            self.motion, self.R_0, self.p_0, self.axes, np.zeros(3) if self.pivot is None else self.pivot
+        )
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -172,7 +176,7 @@ class TwoBodies:
         return Body(*body_of(found[0])), Body(*body_of(T @ found[1] @ T.T)), found[2]
 
     def true_parameters(self, truth: dict[str, Any]) -> Array:
-        """Return the true values of ``parameters`` in this estimate's frames, from a truth file's ``bodies`` and ``joint``.
+        """Return the true values of ``parameters`` in this estimate's frames, from the content of a truth file.
 
         Raises:
             KeyError: the truth is not of two bodies.
@@ -272,7 +276,9 @@ class TwoBodies:
             InputError: the mapping is not an estimate of two bodies, or has another version.
         """
         if not isinstance(values, dict) or values.get("format") != FORMAT or values.get("version") != VERSION:
-            raise InputError(f"not an estimate of two bodies: it must have format {FORMAT!r} and version {VERSION}")
+            raise InputError(
+                f"not an estimate of two bodies: it must have format {FORMAT!r} and version {VERSION}"
+            )
         try:
             joint, told, grasps = values["joint"], values["parameters"], values["grasps"]
             zero, pivot = joint["zero"], joint["pivot_1_m"]
@@ -291,8 +297,12 @@ class TwoBodies:
                 **{key: joint[key] for key in ("q_low", "q_high", "q_rms")},
                 parameters=np.array(told["values"]),
                 covariance=np.array(told["covariance"]),
-                explained=tuple(Explained(**one | {"halves": _halves(one["halves"])}) for one in values["explained"]),
-                recordings=tuple(RecordingFit(**one | {"flags": tuple(one["flags"])}) for one in values["recordings"]),
+                explained=tuple(
+                    Explained(**one | {"halves": _halves(one["halves"])}) for one in values["explained"]
+                ),
+                recordings=tuple(
+                    RecordingFit(**one | {"flags": tuple(one["flags"])}) for one in values["recordings"]
+                ),
                 undetermined=tuple(
                     WeakDirection(one["step"], one["direction"], tuple(one["vector"]), one["reason"])
                     for one in values["undetermined"]
@@ -300,7 +310,9 @@ class TwoBodies:
                 flags=tuple(values["flags"]),
             )
         except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise InputError(f"not a complete estimate of two bodies ({type(error).__name__}: {error})") from error
+            raise InputError(
+                f"not a complete estimate of two bodies ({type(error).__name__}: {error})"
+            ) from error
 
 
 def _halves(values: Any) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -336,7 +348,11 @@ UNITS = {
     "sliding": {"damping": "N s/m", "friction": "N", "stiffness": "N/m", "offset": "N"},
 }
 ABOUT_AXIS = {
-    "hinged": {"B.J_xx": ("J about the axis", "kg m^2"), "B.mc_y": ("m c_y from it", "kg m"), "B.mc_z": ("m c_z from it", "kg m")},
+    "hinged": {
+        "B.J_xx": ("J about the axis", "kg m^2"),
+        "B.mc_y": ("m c_y from it", "kg m"),
+        "B.mc_z": ("m c_z from it", "kg m"),
+    },
     "sliding": {"B.m": ("m", "kg")},
 }  # fmt: skip
 
@@ -349,11 +365,15 @@ def format_two_bodies(found: TwoBodies, truth: dict[str, Any] | None = None) -> 
     count = len(found.recordings)
     hinged, turn = found.motion == "hinged", 180.0 / np.pi if found.motion == "hinged" else 1e3
     unit = "deg" if hinged else "mm"
-    lines = [f"[[Payload{label}: two bodies, {found.kind}]]  robots {said}, {count} recording{'s' * (count > 1)}"]
+    lines = [
+        f"[[Payload{label}: two bodies, {found.kind}]]  robots {said}, {count} recording{'s' * (count > 1)}"
+    ]
     lines += [f"    {found.why}"] if found.why else []
     lines += ["[[Joint, in {1}]]"]
     off = _axis_error(found, truth)
-    lines.append(f"    axis:         {_row(found.axes[:, 0])} +- {np.rad2deg(found.axis_se_rad):.2g} deg{off[0]}")
+    lines.append(
+        f"    axis:         {_row(found.axes[:, 0])} +- {np.rad2deg(found.axis_se_rad):.2g} deg{off[0]}"
+    )
     if found.pivot is not None and found.pivot_se_m is not None:
         lines.append(f"    through:      {_row(found.pivot)} m +- {1e3 * found.pivot_se_m:.2g} mm{off[1]}")
     lines.append(
@@ -379,11 +399,12 @@ def format_two_bodies(found: TwoBodies, truth: dict[str, Any] | None = None) -> 
     lines += [line(name, key, unit) for key, (name, unit) in ABOUT_AXIS[found.motion].items()]
     bodies = found.bodies
     if bodies is None:
-        lines.append("    no masses and inertias that real bodies can have move like this")
+        lines.append("    These values, without their errors, are of no two real bodies.")
     else:
         A, B, (low, high) = bodies
         hides = (
-            f"The joint hides how the mass divides: with {low:.2g} to {high:.2g} kg in the second, all moves alike. One:"
+            f"The joint hides how the mass divides: with {low:.2g} to {high:.2g} kg in the second, all moves "
+            "alike. One pair:"
             if hinged
             else "The joint hides how the inertia divides. One of the pairs that move alike:"
         )
@@ -440,4 +461,3 @@ def _line(name: str, value: float, se: float, unit: str, true: float | None) -> 
 
 def _row(values: Array) -> str:
     return "(" + ", ".join(f"{v:.4g}" for v in values) + ")"
-

@@ -91,12 +91,16 @@ def _positive(P: Array) -> bool:
     return True
 
 
+def _log_det(P: Array) -> float:
+    return float(np.linalg.slogdet(P)[1])
+
+
 def _centre(z: Array, P_A: Array, P_B: Array, D_A: Array, D_B: Array, slope: Array) -> Array:
     """Maximize log det of both bodies plus slope . z by Newton steps from a feasible z."""
 
     def value(z: Array) -> float:
         each = [P + np.tensordot(z, D, 1) for P, D in ((P_A, D_A), (P_B, D_B))]
-        return sum(float(np.linalg.slogdet(P)[1]) for P in each) + slope @ z if all(map(_positive, each)) else -np.inf
+        return sum(_log_det(P) for P in each) + float(slope @ z) if all(map(_positive, each)) else -np.inf
 
     now = value(z)
     for _ in range(60):

@@ -42,7 +42,7 @@ def start(motion: Motion, halves: tuple[tuple[int, ...], tuple[int, ...]], trial
 
 
 def rigid_residual(poses: Poses, i: int, j: int) -> float:
-    """Return the rms of a rigid connection of two grasps: rotation [rad] and position [m], root of the sum of squares."""
+    """Return the rms of what a rigid connection of two grasps leaves: rotation [rad] and position [m] together."""
     A, B = _of(poses, i), _of(poses, j)
     joint = _joint_start("rigid", A, B)
     pair = Pair(((0,), (1,)), np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)), joint, ())
@@ -102,11 +102,11 @@ def _joint_start(motion: Motion, A: Poses, B: Poses) -> Joint:
         x = np.linalg.lstsq(X.reshape(-1, 8), seen.ravel(), rcond=1e-9)[0]
         pivot = across @ x[6:]
         pivot = pivot + axis * (axis @ (0.5 * x[3:6] - pivot))
-        return Joint(motion, R_0, x[3:6], joint.axes, pivot)
+        return Joint(motion, R_0, np.asarray(x[3:6], dtype=float), joint.axes, pivot)
     X = np.concatenate([-back, np.broadcast_to(np.eye(3), back.shape)], axis=2)
     if motion != "sliding":
         x = np.linalg.lstsq(X.reshape(-1, 6), seen.ravel(), rcond=1e-9)[0]
-        return Joint(motion, R_0, x[3:], np.eye(3), np.zeros(3))
+        return Joint(motion, R_0, np.asarray(x[3:], dtype=float), np.eye(3), np.zeros(3))
     moments = np.einsum("qik,qjl->ijkl", np.concatenate([X, seen[..., None]], axis=2),
                         np.concatenate([X, seen[..., None]], axis=2))  # fmt: skip
 
@@ -137,7 +137,7 @@ def _basis(a: Array) -> Array:
     n = np.eye(3)[int(np.argmin(np.abs(a)))]
     n = n - a * (a @ n)
     n /= np.linalg.norm(n)
-    return np.column_stack([a, n, np.cross(a, n)])
+    return np.column_stack([a, n, so3.cross(a, n)])
 
 
 def _bases(pair: Pair, poses: Poses) -> Bases:
@@ -151,7 +151,13 @@ def _bases(pair: Pair, poses: Poses) -> Bases:
         places[i] = np.mean(p_A + times(R_A, p_i) - h[:, i] @ turns[i].T, axis=0)
 
     for i in pair.halves[0][1:]:
-        closes(R[:, 0], h[:, 0], i, np.broadcast_to(pair.R[i], R[:, 0].shape), np.broadcast_to(pair.p[i], h[:, 0].shape))
+        closes(
+            R[:, 0],
+            h[:, 0],
+            i,
+            np.broadcast_to(pair.R[i], R[:, 0].shape),
+            np.broadcast_to(pair.p[i], h[:, 0].shape),
+        )
     b, *rest = pair.halves[1]
     back = np.swapaxes(R[:, 0], 1, 2)
 

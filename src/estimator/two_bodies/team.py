@@ -94,7 +94,9 @@ class Joint:
                 self, R_0=_exp(N[:, 1:] @ x[:2]) @ self.R_0, p_0=self.p_0 + x[2:5], axes=_exp(turn) @ N, pivot=pivot
             )  # fmt: skip
         turn = N[:, 1:] @ x[5:7]
-        return replace(self, R_0=_exp(x[:3]) @ self.R_0, p_0=self.p_0 + N[:, 1:] @ x[3:5], axes=_exp(turn) @ N)
+        return replace(
+            self, R_0=_exp(x[:3]) @ self.R_0, p_0=self.p_0 + N[:, 1:] @ x[3:5], axes=_exp(turn) @ N
+        )
 
     def coordinates(self, R: Array, p: Array) -> Coordinates:
         """Split poses of {B} in {A}, (Q, 3, 3) and (Q, 3), into the joint coordinate and what the joint forbids."""
@@ -102,7 +104,9 @@ class Joint:
         rel = R @ self.R_0.T
         if self.motion == "hinged":
             # The turn about a that is nearest to rel.
-            q = np.arctan2(2.0 * vee(rel) @ a, np.trace(rel, axis1=1, axis2=2) - np.einsum("i,qij,j->q", a, rel, a))
+            q = np.arctan2(
+                2.0 * vee(rel) @ a, np.trace(rel, axis1=1, axis2=2) - np.einsum("i,qij,j->q", a, rel, a)
+            )
             turn = Rotation.from_rotvec(q[:, None] * a).as_matrix()
             off = p - self.pivot - turn @ (self.p_0 - self.pivot)
             return Coordinates(q, np.concatenate([vee(np.swapaxes(turn, 1, 2) @ rel) @ across, off], axis=1))
@@ -215,7 +219,9 @@ class Balance(NamedTuple):
     stick: Array
 
 
-def balance(pair: Pair, data: ArmData, pose: tuple[Array, Array], q: Array, law: Law, gravity: float) -> Balance:
+def balance(
+    pair: Pair, data: ArmData, pose: tuple[Array, Array], q: Array, law: Law, gravity: float
+) -> Balance:
     """Return the balance of both bodies, from the robots' data, the pose of {B} in {A} and the joint coordinate.
 
     The generalized force of the joint on B is -(damping q_dot + friction sign(q_dot) + stiffness q - offset).
@@ -278,4 +284,3 @@ def halves_of(robots: int) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
         B = tuple(i for i in range(1, robots) if mask >> (i - 1) & 1)
         out.append((tuple(i for i in range(robots) if i not in B), B))
     return out
-

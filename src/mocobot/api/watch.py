@@ -18,7 +18,7 @@ from estimator.statistics import measured
 from mocobot.api.calibration import Calibration, calibrate
 from mocobot.api.conversion import convert, convert_parts
 from mocobot.api.diagnosis import Diagnosis, diagnose
-from mocobot.api.estimation import Estimate, estimate
+from mocobot.api.estimation import Estimate, estimate_rigid
 from mocobot.api.inspection import inspect
 from mocobot.api.recordings import Say, quiet, read
 from mocobot.api.watch_joints import logs_in, look_at_joints, verdict_line
@@ -218,11 +218,11 @@ def _conclude(seen: Watched, jobs: int, say: Say, simulated: Callable[[int], obj
         seen.lines.append("Nothing can be estimated: there is no recording of robots that carry something.")
         return
     try:
-        seen.estimate = estimate(carried, say=say)
+        seen.estimate = estimate_rigid(carried, say=say)
         if seen.estimate.contradicts:
             say("calibrating")
             seen.calibration = calibrate(carried, None, seen.of(free=True), say=say)
-            seen.estimate = estimate(carried, calibration=seen.calibration, say=say)
+            seen.estimate = estimate_rigid(carried, calibration=seen.calibration, say=say)
     except InputError as error:
         seen.lines.append(f"No estimate: {error}.")
     if seen.estimate is not None:
