@@ -46,6 +46,8 @@ describe, reach it rarely."""
 LEAST_MOVING, FAST = 0.05, 0.2
 """Least share of the time in which the joint moves faster than this share of its rms speed. Chosen: a base that slips
 once moves less."""
+LEAST_RETURN = 0.3
+"""Least share of the joint's mean square that a steady drift leaves. Chosen: a base that creeps only drifts."""
 APART = 2e-3
 """Root of squared misfits of two robots' relative pose [rad, m] below which one rigid body is not doubted. Chosen:
 calibrated robots reach 3e-4."""
@@ -68,11 +70,17 @@ def joint_of(found: Sequence[Candidate]) -> Candidate | None:
 
 
 def _moves(joint: Candidate) -> bool:
-    """Whether the joint moves far enough, and for long enough, not to be a flexible grasp or a base that slips."""
-    speed = np.abs(np.concatenate([np.gradient(q, t) for q, t in zip(joint.q, joint.time, strict=True)]))
+    """Whether the joint moves too far and too often, to and fro, to be a flexible grasp or a base that slips."""
+    pairs = list(zip(joint.q, joint.time, strict=True))
+    speed = np.abs(np.concatenate([np.gradient(q, t) for q, t in pairs]))
+    off = np.concatenate([q - np.polyval(np.polyfit(t, q, 1), t) for q, t in pairs])
+    steady = np.concatenate([q - q.mean() for q, _ in pairs])
+    returns = float(np.mean(off**2) / np.mean(steady**2))
     moving = float(np.mean(speed > FAST * np.sqrt(np.mean(speed**2))))
     arms = [_arm(joint, half[0]) for half in joint.halves if len(half) == 1]
-    return moving > LEAST_MOVING and all(joint.q_rms * arm > LEAST_M for arm in arms)
+    return (
+        moving > LEAST_MOVING and returns > LEAST_RETURN and all(joint.q_rms * arm > LEAST_M for arm in arms)
+    )
 
 
 def _arm(joint: Candidate, robot: int) -> float:

@@ -501,7 +501,9 @@ def _diagnosed(plan: CampaignPlan, recordings: Sequence[Recording]) -> TeamDiagn
         closed_loop=plan.closed_loop,
     )  # fmt: skip
     if not isinstance(found, TeamDiagnosed):
-        raise InputError("the diagnosis found a payload of two bodies; a campaign hides effects in rigid ones")
+        raise InputError(
+            "the diagnosis found a payload of two bodies; a campaign hides effects in rigid ones"
+        )
     return found
 
 
