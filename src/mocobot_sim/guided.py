@@ -8,13 +8,15 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.arm import dynamics as gimbal
+from estimator.arm.delta import forward_kinematics
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
-from mocobot_sim.control.control import ControlGains
+from estimator.two_bodies.result import TwoBodies
+from mocobot_sim.control.control import ControlGains, home_phi
 from mocobot_sim.scene.as_built import AsBuilt, units_of
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.trial.actors import Stage
@@ -155,6 +157,43 @@ class FloatArms:
         return force
 
 
+def holding_forces(payload: TwoBodies, q: float, up_1: ArrayLike, gravity_mps2: float) -> Array:
+    """Forces at the grasps that balance the weights of two bodies and the spring of their joint [N], shape (N, 3).
+
+    They are the forces of least norm, in the axes of {1}, in equilibrium with both weights and without a moment about
+    the joint.
+
+    Args:
+        payload: estimate with both bodies.
+        q: position of the joint [rad or m].
+        up_1: upward unit vector in {1}, shape (3,).
+        gravity_mps2: gravitational acceleration [m/s^2].
+
+    Raises:
+        InputError: the estimate cannot divide the masses.
+    """
+    if payload.bodies is None:
+        raise InputError("the estimate does not tell both bodies' masses; carrying their weight needs them")
+    joint, up = payload.joint, np.asarray(up_1, dtype=float)
+    axis, slides = joint.axes[:, 0], payload.motion == "sliding"
+    turn = Rotation.from_rotvec(np.zeros(3) if slides else q * axis).as_matrix()
+    shift = joint.pivot - turn @ joint.pivot + (q * axis if slides else 0.0)
+    grasps, on = payload.p_ki.copy(), np.isin(np.arange(payload.robots) + 1, payload.halves[1])
+    grasps[on] = (joint.p_0 + payload.p_ki[on] @ joint.R_0.T) @ turn.T + shift
+    first, second = payload.bodies[:2]
+    weights = gravity_mps2 * np.array([first.mass, second.mass])
+    centres = np.array([first.com, turn @ second.com + shift])
+    rows, load = np.zeros((7, payload.robots, 3)), np.zeros(7)
+    rows[:3], load[:3] = np.eye(3)[:, None], weights.sum() * up
+    rows[3:6] = np.moveaxis([np.cross(p, np.eye(3), axisb=1).T for p in grasps], 0, 1)
+    load[3:6] = np.cross(weights @ centres, up)
+    rows[6] = on[:, None] * (axis if slides else np.cross(axis, grasps - joint.pivot))
+    load[6] = weights[1] * up @ (axis if slides else np.cross(axis, centres[1] - joint.pivot))
+    terms = {name: payload.value(name)[0] for name in payload.law}
+    load[6] += terms.get("stiffness", 0.0) * q - terms.get("offset", 0.0)
+    return np.linalg.lstsq(rows.reshape(7, -1), load, rcond=1e-9)[0].reshape(-1, 3)
+
+
 @dataclass(frozen=True)
 class Grip:
     """Impedance of two hands that hold a payload; isotropic.
@@ -187,6 +226,43 @@ class Move:
     rest_s: float = 0.0
 
 
+class FloatTwoBodies(FloatArms):
+    """Actor that lets the arms carry two bodies on a joint, by ``holding_forces`` at the current tilt and fold.
+
+    Args:
+        payload: estimate with both bodies.
+        X_Wb: base frames of the robots, N transforms; the joint's position follows from them and the joint sensors.
+        as_built, start_s, fade_s: as for ``FloatArms``.
+    """
+
+    def __init__(
+        self,
+        payload: TwoBodies,
+        X_Wb: RigidTransform,
+        as_built: Sequence[AsBuilt] = (),
+        start_s: float = 0.2,
+        fade_s: float = 1.5,
+    ) -> None:
+        none = np.zeros((payload.robots, 3))
+        super().__init__(Payload(0.0, np.zeros(3), none, none), as_built, start_s, fade_s)
+        self._two, self._X_Wb = payload, X_Wb
+
+    def forces(self) -> Array:
+        """Compute the forces that balance both weights now: one per wrist, in its {b} [N], shape (N, 3)."""
+        two, data, index = self._two, self._stage.data, self._stage.index
+        R_bi = gimbal.rotation(data.qpos[index.gimbal_qpos] + self._theta_zero)
+        phi = home_phi(omnid_design()) + data.qpos[index.motor_qpos] + data.qpos[index.spring_qpos]
+        wrist = forward_kinematics(phi, omnid_design())
+        X_Wi = self._X_Wb * RigidTransform.from_components(wrist, Rotation.from_matrix(R_bi))
+        k = two.halves[1][0] - 1
+        X_1k = X_Wi[0].inv() * X_Wi[k]
+        q = float(two.joint.coordinates(X_1k.rotation.as_matrix()[None], X_1k.translation[None]).q[0])
+        force_1 = holding_forces(two, q, R_bi[0, 2], self._gravity)
+        # {1} and {b} of every robot by the gimbals, and the bases' headings.
+        R_W1 = X_Wi[0].rotation.as_matrix()
+        return np.einsum("nji,nj->ni", self._X_Wb.rotation.as_matrix(), force_1 @ R_W1.T)
+
+
 @dataclass(frozen=True)
 class HandLog:
     """Log of a hand, one row per sample, in world axes.
@@ -213,7 +289,8 @@ class HandLog:
 class _OnPayload:
     """Base class of actors that apply a wrench at a point of the payload."""
 
-    def __init__(self, point_1: ArrayLike) -> None:
+    def __init__(self, point_1: ArrayLike, second: bool = False) -> None:
+        self._second = second
         self._point_1 = np.asarray(point_1, dtype=float)
         if self._point_1.shape != (3,) or not np.isfinite(self._point_1).all():
             raise InputError(
@@ -224,11 +301,15 @@ class _OnPayload:
         """Prepare for a trial.
 
         Raises:
-            InputError: there is no payload.
+            InputError: there is no payload, or it has no second body to hold.
         """
         if stage.index.payload_body < 0:
             raise InputError("the robots hold nothing; a hand needs a payload")
         self._stage, self._body = stage, stage.index.payload_body
+        if self._second:
+            if not stage.index.payload_dof.size:
+                raise InputError("the payload has no second body; a hand cannot hold it")
+            self._body = int(stage.model.dof_bodyid[stage.index.payload_dof[0]])
         self._rows: list[tuple[Array, ...]] = []
         self._velocity = np.zeros(6)
 
@@ -257,16 +338,22 @@ class GuidingHand(_OnPayload):
     """Actor that pulls the payload along a desired path by a spring-damper.
 
     Args:
-        point_1: point of the payload that the hand holds, in {1} [m], shape (3,).
+        point_1: point that the hand holds, in {1} [m] (of the second body: with the joint at zero), shape (3,).
         moves: desired path of the grip, relative to its initial pose.
         start_s: time at which the motion starts [s].
         grip: impedance of the hand; None for the default.
+        second: whether the hand holds the second body of a payload of two.
     """
 
     def __init__(
-        self, point_1: ArrayLike, moves: Sequence[Move], start_s: float, grip: Grip | None = None
+        self,
+        point_1: ArrayLike,
+        moves: Sequence[Move],
+        start_s: float,
+        grip: Grip | None = None,
+        second: bool = False,
     ) -> None:
-        super().__init__(point_1)
+        super().__init__(point_1, second)
         if not moves or not all(move.duration_s > 0 and move.rest_s >= 0 for move in moves):
             raise InputError("a hand needs moves that last longer than 0 s, with rests of 0 s or more")
         self._moves, self._start_s, self._grip = tuple(moves), start_s, grip or Grip()

@@ -229,6 +229,7 @@ def _series(trial: ReplayTrial, key_share: float) -> list[rrb.Container | rrb.Vi
             "grasp_rotation_mrad": "flange to grasp frame [mrad]",
             "balance_force": "force balance in {1} [N] (RGB: x, y, z)",
             "balance_moment": "moment balance about the CoM [N m]",
+            "joint": "joint between the two bodies [mm or mrad]",
         },
     }
     keys = {"joints": "joints", "residuals": "robots"}
@@ -273,6 +274,7 @@ def _missing(trial: ReplayTrial) -> set[str]:
         ("omega", "velocity", "force", "moment"): trial.data,
         ("grasp_position_mm", "grasp_rotation_mrad"): trial.motion,
         ("balance_force",): trial.balance,
+        ("joint",): trial.two,
         ("balance_moment",): trial.balance and trial.balance.moment,
     }
     return {quantity for quantities, source in given.items() if source is None for quantity in quantities}

@@ -35,6 +35,7 @@ from mocobot_view.payload import (
 )
 from mocobot_view.robot import BodyMotion, body_motion, robot_shapes
 from mocobot_view.shapes import Shape
+from mocobot_view.two_bodies import TwoBodyMotion, two_body_motion
 
 CUTOFF_HZ, FILTERED_HZ = 5.0, 50.0
 """Cut-off frequency of the low-pass filter, and rate of its stored output [Hz]. Chosen."""
@@ -105,6 +106,7 @@ class ReplayTrial:
     facts: BodyFacts | None  # quantities of the estimate to draw, or None
     truth: BodyFacts | None  # true quantities of the payload to draw, or None
     diagnosis: WrittenDiagnosis | None  # diagnosis of the team, or None
+    two: TwoBodyMotion | None  # the payload's two bodies if it is not rigid, or None
     notes: tuple[str, ...]  # sentences for the viewer
 
     @property
@@ -147,6 +149,11 @@ def replay_trial(
     facts = None if estimate is None else facts_of(estimate)
     grasps = held(facts, meta.robots)
     bases, motion = placed(R_bi, wrist, grasps, height, meta.arms)
+    two = None
+    if motion is None and meta.trial != FREE:
+        two = two_body_motion(recording, R_bi, wrist, height)
+    if two is not None:
+        bases, motion, notes = two.bases, two.first, [two.sentence]
     if motion is None and meta.trial != FREE:
         notes.append(
             "The grasps are not known, so neither is where the robots stand: they are drawn in a row, without a "
@@ -167,13 +174,14 @@ def replay_trial(
         bodies=bodies,
         bases=bases,
         motion=motion,
-        shape=_shape(recording, payload, facts, grasps, notes),
+        shape=_shape(recording, payload, facts, grasps, notes) if two is None else two.shapes[0],
         data=data,
         balance=None if data is None or estimate is None else balance(data, estimate),
         estimate=estimate,
         facts=facts,
         truth=truth,
         diagnosis=diagnosis,
+        two=two,
         notes=tuple(notes),
     )
 

@@ -29,6 +29,7 @@ from mocobot_view.payload import BodyFacts, Grasps
 from mocobot_view.replay_trial import ReplayTrial
 from mocobot_view.robot import PATHS, TINTED, by_place, fixed_frames, robot_shapes
 from mocobot_view.shapes import Shape
+from mocobot_view.two_bodies import TwoBodyMotion
 
 
 def time_column(time: Array) -> rr.TimeColumn:
@@ -153,11 +154,30 @@ def log_payload(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
     send_poses(stream, payload, trial.time, trial.motion.p_W1, trial.motion.quaternion)
     if trial.shape is not None:
         log_shape(stream, f"{payload}/shape", trial.shape)
+    if trial.two is not None:
+        _log_second(stream, trial, trial.two)
     if trial.facts is not None:
         _log_facts(stream, f"{payload}/estimate", trial.facts, "", colours.ESTIMATE, thick=1.0)
     if trial.truth is not None:
         # Longer and thinner than the estimate, so that both are visible if they agree.
         _log_facts(stream, f"{payload}/truth", trial.truth, " true", colours.TRUTH, thick=0.5)
+
+
+def _log_second(stream: rr.RecordingStream, trial: ReplayTrial, two: TwoBodyMotion) -> None:
+    """Log the second body below the root of the trial, and the joint's axis in {1}."""
+    second = f"{trial.name}/second"
+    send_poses(stream, second, trial.time, two.second.p_W1, two.second.quaternion)
+    if two.shapes[1] is not None:
+        log_shape(stream, f"{second}/shape", two.shapes[1])
+    axis = rr.Arrows3D(
+        origins=[two.pivot - FRAME_M * two.axis], vectors=[2.0 * FRAME_M * two.axis], colors=[colours.ESTIMATE],
+        radii=0.008,
+    )  # fmt: skip
+    stream.log(f"{trial.name}/payload/joint", axis, static=True)
+    name = "slide" if two.slides else "hinge"
+    log_label(
+        stream, f"{trial.name}/payload/joint/name", two.pivot + FRAME_M * two.axis, name, colours.ESTIMATE
+    )
 
 
 def _log_facts(
@@ -222,6 +242,9 @@ def log_series(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
             ("grasp_position_mm", trial.time, 1e3 * motion.gap_position_m[..., None], ("",)),
             ("grasp_rotation_mrad", trial.time, 1e3 * motion.gap_rotation_rad[..., None], ("",)),
         ]
+    if trial.two is not None:
+        path, unit = f"{trial.name}/series/joint", "mm" if trial.two.slides else "mrad"
+        log_lines(stream, path, trial.time, 1e3 * trial.two.q[:, None], (f"q [{unit}]",), [colours.ESTIMATE])
     for quantity, time, values, parts in series:
         _per_robot(stream, trial, quantity, time, values, parts)
     if data is not None and balance is not None:
@@ -345,7 +368,8 @@ def _residuals(trial: ReplayTrial) -> str:
         if trial.balance.moment is not None:
             text += f", {rms_length(trial.balance.moment):.3g} N m about the centre of mass"
         lines.append(text)
-    return "**What one rigid payload leaves over (rms)**\n\n" + "\n".join(lines) if lines else ""
+    body = "one rigid payload leaves" if trial.two is None else "two bodies on a joint leave"
+    return f"**What {body} over (rms)**\n\n" + "\n".join(lines) if lines else ""
 
 
 def _key(trial: ReplayTrial) -> str:
@@ -361,6 +385,7 @@ def _key(trial: ReplayTrial) -> str:
             held and trial.facts,
             "magenta: estimated centre of mass, principal axes, and the solid ellipsoid of that mass and inertia",
         ),
+        (trial.two, "magenta arrow: axis of the joint between the two bodies"),
         (held and trial.truth, "green, thin: the same in truth; true grasp frames are longer"),
         (trial.diagnosis and trial.diagnosis.causes, "red ball: a cause that the diagnosis names sits there"),
         (True, f"line at a wrist: its path, in the robot's colour{commanded}"),

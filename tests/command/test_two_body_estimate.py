@@ -26,7 +26,9 @@ def door(tmp_path_factory: pytest.TempPathFactory):
 def test_auto_tries_two_bodies_where_one_is_refused(door, capsys, tmp_path):
     code, out, err = run(capsys, "estimate", door, "--out", tmp_path / "door.json")
     assert (code, err) == (0, "")
-    assert out.startswith("[[Payload: two bodies, hinged]]  robots 1 | 2 3, 1 recording\n    Not one rigid body: ")
+    assert out.startswith(
+        "[[Payload: two bodies, hinged]]  robots 1 | 2 3, 1 recording\n    Not one rigid body: "
+    )
     mass = re.search(r"    m: +(\d+\.\d+) \+- (0\.000\d+) kg  \(true 10\.50+\)", out)
     assert mass is not None
     assert float(mass[1]) == pytest.approx(10.5, abs=5.0 * float(mass[2]))

@@ -24,6 +24,7 @@ from discrepancy.team.long import Choice, search_parts
 from discrepancy.team.response import confirm, left_by
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.told import TeamDiagnosed
+from discrepancy.team.two_bodies import TwoBodyDiagnosed, find_joint
 from discrepancy.team.verdict import judged_team
 from estimator.arm.unit import ENCODERS, ArmUnit, in_encoder_frames
 from estimator.errors import InputError
@@ -136,7 +137,7 @@ def diagnose_team(
     jobs: int = 1,
     say: Callable[[str], object] = lambda _: None,
     simulated: Callable[[int], object] | None = None,
-) -> TeamDiagnosed:
+) -> TeamDiagnosed | TwoBodyDiagnosed:
     """Check recordings of one payload, estimate it, and find what the simulation gets wrong.
 
     Args:
@@ -157,6 +158,9 @@ def diagnose_team(
             excluded cause does not exist.
     """
     check_recordings(recordings)
+    two = find_joint(recordings, say)
+    if two is not None:
+        return two
     say("estimate")
     # A payload mass that differs between trials is a cause of its own, unless that cause is excluded.
     estimate = estimate_payload(recordings, compare_masses="payload_mass" in excluded, withhold=False)

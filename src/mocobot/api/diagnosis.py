@@ -14,6 +14,7 @@ from discrepancy.result.read import name_of
 from discrepancy.team.causes import read_tolerances
 from discrepancy.team.diagnosis import against_truth, diagnose_team
 from discrepancy.team.told import TeamDiagnosed
+from discrepancy.team.two_bodies import TwoBodyDiagnosed
 from mocobot.api.recordings import Given, Robots, Say, quiet, recordings_of
 from mocobot.cluster import workers_of
 from mocobot.option_types import made
@@ -84,7 +85,7 @@ class Diagnosis(Folder):
         found: diagnosis of a team or of a single robot.
     """
 
-    found: TeamDiagnosed | JointDiagnosed
+    found: TeamDiagnosed | TwoBodyDiagnosed | JointDiagnosed
     result = "diagnosis"
 
     def to_dict(self) -> dict[str, Any]:
@@ -126,7 +127,7 @@ class Diagnosis(Folder):
         Args:
             truth: true payload, as ``GroundTruth.to_dict`` returns it; no errors are added if it does not fit.
         """
-        if isinstance(self.found, JointDiagnosed):
+        if not isinstance(self.found, TeamDiagnosed):
             return self
         return replace(self, found=against_truth(self.found, truth))
 

@@ -496,10 +496,15 @@ def run_set(task: tuple[CampaignPlan, CampaignSet, Json | None]) -> Json:
 
 def _diagnosed(plan: CampaignPlan, recordings: Sequence[Recording]) -> TeamDiagnosed:
     robots = Robots(plan.calibration)
-    return diagnose_team(
+    found = diagnose_team(
         [robots.of(recording) for recording in recordings], plan.tolerances, plan.exclude,
         closed_loop=plan.closed_loop,
     )  # fmt: skip
+    if not isinstance(found, TeamDiagnosed):
+        raise InputError(
+            "the diagnosis found a payload of two bodies; a campaign hides effects in rigid ones"
+        )
+    return found
 
 
 def _limits(plan: CampaignPlan, found: TeamDiagnosed) -> Json:

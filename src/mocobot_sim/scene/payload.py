@@ -7,6 +7,7 @@ one hinge or slide.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,8 @@ OWN_ELEMENTS = ("asset", "compiler", "default", "statistic", "visual", "worldbod
 GRASP = re.compile(r"grasp([0-9]+)")
 SECOND = "second"
 """Name of the second body of a payload of two."""
+COLOURS = ([0.55, 0.60, 0.70, 1.0], [0.86, 0.62, 0.30, 1.0])
+"""Colours of the drawn bodies of an estimated payload of two."""
 
 
 @dataclass(frozen=True)
@@ -136,8 +139,8 @@ def grasp_frames(payload_root: mjcf.RootElement, where: str) -> RigidTransform:
     They are read from the compiled payload, so all orientation attributes of MJCF are supported.
 
     Raises:
-        InputError: MuJoCo cannot compile the payload, or it is neither a rigid body ``payload`` with sites ``grasp1`` ..
-            ``graspN``, the first at its origin, nor two such bodies on a joint.
+        InputError: MuJoCo cannot compile the payload; or it is neither a rigid body ``payload`` with sites ``grasp1``
+            to ``graspN``, the first at its origin, nor two such bodies on a joint.
     """
     try:
         model = compiled(payload_root)
@@ -254,6 +257,57 @@ def payload_mjcf(mass_kg: float, p_1c: Array, inertia_1: Array, X_1i: RigidTrans
         if np.linalg.norm(at - p_1c) > 1e-3:
             body.add("geom", name=f"bar{i}", type="capsule", fromto=[*p_1c, *at], size=[0.01], **look)
     return root
+
+
+def two_body_mjcf(bodies: Sequence[tuple[float, Array, Array]], joint: PayloadJoint, X_1i: Array) -> str:
+    """Generate the MJCF document of a payload of two bodies.
+
+    Args:
+        bodies: mass [kg], centre of mass in {1} [m], shape (3,), and inertia about it in the axes of {1} [kg m^2],
+            shape (3, 3), of ``payload`` and ``second``, with the joint at zero.
+        joint: the joint; its id is ignored.
+        X_1i: grasp frames in {1} with the joint at zero, shape (N, 4, 4).
+    """
+    root = mjcf.RootElement(model="payload")
+    root.compiler.angle = "radian"
+    first = root.worldbody.add("body", name="payload")
+    second = first.add("body", name=SECOND)
+    kind = "slide" if joint.slides else "hinge"
+    spring = {"stiffness": joint.stiffness, "springref": joint.rest} if joint.stiffness else {}
+    second.add(
+        "joint",
+        name="joint",
+        type=kind,
+        pos=joint.pivot_1,
+        axis=joint.axis_1,
+        damping=joint.damping,
+        **spring,
+    )
+    look = {"group": 2, "contype": 0, "conaffinity": 0, "mass": 0.0}
+    for body, (mass, com, inertia), rgba in zip((first, second), bodies, COLOURS, strict=True):
+        _check_inertia(inertia)
+        six = [inertia[at] for at in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+        body.add("inertial", pos=com, mass=mass, fullinertia=six)
+        body.add("geom", name=f"{body.name}_com", type="sphere", pos=com, size=[0.02], rgba=rgba, **look)
+    for i, X in enumerate(X_1i):
+        side = int(joint.second[i])
+        body, com = (first, second)[side], bodies[side][1]
+        quat = Rotation.from_matrix(X[:3, :3]).as_quat(scalar_first=True) if i else [1.0, 0.0, 0.0, 0.0]
+        at = X[:3, 3] if i else np.zeros(3)
+        body.add("site", name=f"grasp{i + 1}", pos=at, quat=quat, group=4, size=[0.006])
+        if np.linalg.norm(at - com) > 1e-3:
+            ends = [*com, *at]
+            body.add(
+                "geom",
+                name=f"bar{i + 1}",
+                type="capsule",
+                fromto=ends,
+                size=[0.01],
+                rgba=COLOURS[side],
+                **look,
+            )
+    # PyMJCF cannot read the root default class that it writes.
+    return re.sub(r'<default>\s*<default class="/"/>\s*</default>\s*| class="/"', "", root.to_xml_string())
 
 
 def nearest_inertia(inertia: Array, least_ratio: float) -> Array:

@@ -57,6 +57,7 @@ class _Others:
         data = stage.data
         if self.carries and (self.pushes or self.actors):
             data.xfrc_applied[stage.index.payload_body] = 0.0
+            data.xfrc_applied[stage.model.dof_bodyid[stage.index.payload_dof]] = 0.0
         if self.actors:
             data.qfrc_applied[:] = 0.0
         for actor in self.actors:
