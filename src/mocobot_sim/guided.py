@@ -185,13 +185,14 @@ def holding_forces(payload: TwoBodies, q: float, up_1: ArrayLike, gravity_mps2: 
     centres = np.array([first.com, turn @ second.com + shift])
     rows, load = np.zeros((7, payload.robots, 3)), np.zeros(7)
     rows[:3], load[:3] = np.eye(3)[:, None], weights.sum() * up
-    rows[3:6] = np.moveaxis([np.cross(p, np.eye(3), axisb=1).T for p in grasps], 0, 1)
+    rows[3:6] = np.swapaxes(np.array([np.cross(p, np.eye(3)).T for p in grasps]), 0, 1)
     load[3:6] = np.cross(weights @ centres, up)
     rows[6] = on[:, None] * (axis if slides else np.cross(axis, grasps - joint.pivot))
     load[6] = weights[1] * up @ (axis if slides else np.cross(axis, centres[1] - joint.pivot))
     terms = {name: payload.value(name)[0] for name in payload.law}
     load[6] += terms.get("stiffness", 0.0) * q - terms.get("offset", 0.0)
-    return np.linalg.lstsq(rows.reshape(7, -1), load, rcond=1e-9)[0].reshape(-1, 3)
+    forces = np.linalg.lstsq(rows.reshape(7, -1), load, rcond=1e-9)[0].reshape(-1, 3)
+    return np.asarray(forces, dtype=np.float64)
 
 
 @dataclass(frozen=True)

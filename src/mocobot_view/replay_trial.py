@@ -87,6 +87,8 @@ def balance(data: GraspData, estimate: PayloadEstimate) -> Balance | None:
 MISFIT_M, MISFIT_RAD = 0.01, 0.03
 """Rms gaps between flanges and grasps above which the grasps do not fit [m], [rad]. Chosen: uncalibrated robots have
 6 mm and 10 mrad."""
+BETTER = 3.0
+"""Ratio of the gaps, one rigid body over two bodies, above which two are drawn. Chosen, as for the diagnosis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,22 +152,25 @@ def replay_trial(
     grasps = held(facts, meta.robots)
     bases, motion = placed(R_bi, wrist, grasps, height, meta.arms)
     two = None
-    if motion is None and meta.trial != FREE:
+    if meta.trial != FREE and (motion is None or _misfits(motion)):
         two = two_body_motion(recording, R_bi, wrist, height)
+    if two is not None and motion is not None:
+        gap, left = rms(motion.gap_position_m), rms(two.first.gap_position_m)
+        two = two if left < gap / BETTER else None
     if two is not None:
         bases, motion, notes = two.bases, two.first, [two.sentence]
+        estimate, facts = None, None  # of one rigid body
     if motion is None and meta.trial != FREE:
         notes.append(
             "The grasps are not known, so neither is where the robots stand: they are drawn in a row, without a "
             "payload. Give an estimate from recordings with motion (--estimate)."
         )
-    elif motion is not None:
+    elif motion is not None and _misfits(motion):
         gap, turn = rms(motion.gap_position_m), rms(motion.gap_rotation_rad)
-        if gap > MISFIT_M or turn > MISFIT_RAD:
-            notes.append(
-                f"The grasps do not fit this recording: flanges and grasps are {1e3 * gap:.0f} mm and "
-                f"{1e3 * turn:.0f} mrad apart (rms)."
-            )
+        notes.append(
+            f"The grasps do not fit this recording: flanges and grasps are {1e3 * gap:.0f} mm and "
+            f"{1e3 * turn:.0f} mrad apart (rms)."
+        )
     data = None if meta.trial == FREE else filtered(recording, notes)
     return ReplayTrial(
         name=name,
@@ -184,6 +189,10 @@ def replay_trial(
         two=two,
         notes=tuple(notes),
     )
+
+
+def _misfits(motion: PayloadMotion) -> bool:
+    return rms(motion.gap_position_m) > MISFIT_M or rms(motion.gap_rotation_rad) > MISFIT_RAD
 
 
 def distinct_names(recordings: Sequence[Path]) -> list[str]:

@@ -19,7 +19,7 @@ def test_both_bodies_move_as_simulated(name):
     sign = np.sign(two.axis @ axis)
     assert np.std(sign * two.q - q) < 2e-4
     # The pose of {k} in {1} by MuJoCo's joint, against the drawn bodies.
-    turn = Rotation.from_rotvec(np.outer(0.0 if truth.joint.slides else q, axis))
+    turn = Rotation.from_rotvec(np.outer(0.0 * q if truth.joint.slides else q, axis))
     R = turn.as_matrix() @ truth.R_1i[k]
     p = truth.joint.pivot_1 + turn.apply(truth.p_1i[k] - truth.joint.pivot_1)
     p = p + np.outer(q, axis) if truth.joint.slides else p

@@ -125,7 +125,7 @@ class TwoBodyDiagnosed:
             "format": FORMAT, "version": VERSION, "machine": "team", "finished": True, "recordings": names,
             "reference": [], "prior_odds": float(np.exp(-SETTINGS.cause_nats)),
             "verdict": "explained" if self.joint.noise < LEAST_DROP else "partly_explained",
-            "causes": [cause], "places": [], "suspected": [], "scatter": [], "foretold": None,
+            "causes": [cause], "places": [], "suspected": [], "scatter": [],
             "evidence": {"before": [self._candidate(one) for one in self.found], "after": None}, "gain": None,
             "not_simulated": "a rigid payload cannot follow these commands", "rollouts": None, "undecidable":
             self._undecidable(), "detection_limits": [], "residual": self._residual(),

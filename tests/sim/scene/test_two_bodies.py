@@ -123,7 +123,7 @@ BAD = {
         "has 2 joints",
     ),
     "ball": (f"<joint type='ball'/>{INERTIAL}<site name='grasp2'/>", "one hinge or slide"),
-    "not held": (f"{HINGE}{INERTIAL}", "another grasp"),
+    "not held": (f"{HINGE}{INERTIAL}", "one other grasp"),
     "massless": (f"{HINGE}<site name='grasp2'/>", "MuJoCo cannot compile"),
 }
 
