@@ -313,7 +313,7 @@ class Bases:
 def poses(phi: Array, theta: Array, arms: Arms, base: Array | None = None) -> tuple[Array, Array]:
     """Return R_bi and h [m] in level base frames, (..., N, 3, 3) and (..., N, 3), from true angles (..., N, 3).
 
-    Of driving bases, ``base`` are their poses (x, y, yaw), (..., N, 3); the frames then are those at the start.
+    With driving bases, ``base`` has their poses (x, y, yaw), (..., N, 3); the frames then are those at the start.
     """
     R, h = levelled(arms, rotation(theta), forward_kinematics(phi, arms))
     if base is None:
@@ -343,7 +343,7 @@ def pose_error(R: Array, h: Array, shared: Shared, bases: Bases) -> Array:
 def robot_data(s: Array, arms: Arms) -> ArmData:
     """Return poses in level base frames, twists and wrenches of robots with true signals s, shape (Q, ..., 21).
 
-    ``arms`` describes one robot, or all robots in the axis before the last. Of driving bases s has 30 entries, the last
+    ``arms`` describes one robot, or all robots in the axis before the last. With driving bases, s has 30 entries, the last
     nine as ``arm_data`` takes them; poses then are in the base frames at the start.
     """
     phi, phi_dot, phi_ddot, theta, theta_dot, theta_ddot, tau, *_ = np.moveaxis(

@@ -303,7 +303,7 @@ def refined(mistake: Mistake, total: Callable[[Mistake], float]) -> Mistake:
     if mistake.resized is None:
         return mistake
     resized, start = mistake.resized, dict(mistake.sizes)["offset_rad"]
-    found = minimize_scalar(
+    found: Any = minimize_scalar(
         lambda offset: min(total(resized(float(offset))), 1e12),
         bounds=(start - STEP_RAD, start + STEP_RAD),
         method="bounded",

@@ -11,14 +11,14 @@ import pytest
 from source_tree import SRC, module_files
 
 CEILINGS = {
-    "estimator": 6_652,
-    "mocobot_logs": 7_500,
-    "mocobot_inspect": 2_960,
-    "mocobot_sim": 5_783,
-    "discrepancy": 13_900,
-    "mocobot_view": 2_144,
-    "mocobot_report": 2_823,
-    "mocobot": 4_890,
+    "estimator": 8_240,
+    "mocobot_logs": 7_370,
+    "mocobot_inspect": 2_930,
+    "mocobot_sim": 6_370,
+    "discrepancy": 14_720,
+    "mocobot_view": 2_240,
+    "mocobot_report": 2_790,
+    "mocobot": 4_990,
 }
 """Most lines of code a package (no blanks, comments or docstrings). Raise one only within a planned budget."""
 MOST_LINES = 700
@@ -27,9 +27,10 @@ MOST_ARGUMENTS = 7
 """Arguments of one function, without ``self`` and ``cls``."""
 LONG_CALLS = {
     "discrepancy.team.diagnosis.diagnose_team": 11,
-    "estimator.arm.dynamics.wrench_on_payload": 8,
+    "estimator.arm.dynamics.wrench_on_payload": 9,
     "estimator.arm.motion._changes": 8,
     "estimator.estimate.uncertainty.judge": 9,
+    "estimator.signals._fill": 8,
     "mocobot.api.diagnosis.diagnose": 8,
     "mocobot_logs.convert.convert": 8,
     "mocobot_logs.convert.convert_parts": 8,

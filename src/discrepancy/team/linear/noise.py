@@ -154,7 +154,7 @@ def drifts(signals: Signals, rng: np.random.Generator, count: int) -> Array:
     of, (Q, N) = Drift(), signals.phi.shape[:2]
     white = rng.standard_normal((Q, N, 6, count))
     same = float(np.exp(-1.0 / (ROCKING_S * signals.rate_hz)))
-    rock = lfilter([np.sqrt(1.0 - same**2)], [1.0, -same], white, axis=0)
+    rock = np.asarray(lfilter([np.sqrt(1.0 - same**2)], [1.0, -same], white, axis=0))
     walk = np.cumsum(white, axis=0) / np.sqrt(signals.rate_hz)
     rolled = butter(2, ROLLERS_HZ, btype="band", fs=signals.rate_hz, output="sos")
     rock[:, :, :2] += (ROLLERS_RAD / of.rock_rad) * _unit(sosfiltfilt(rolled, white[:, :, :2], axis=0))

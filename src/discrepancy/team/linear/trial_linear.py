@@ -486,7 +486,7 @@ def with_derivatives(trial: TrialLinear) -> TrialLinear:
 def filtered(signals: Signals) -> Array:
     """Filter the signals and arrange them in the slots of ``estimator.arm.motion``, shape (Q, N, 21).
 
-    Of driving bases, pose, rate and acceleration follow, shape (Q, N, 30).
+    Pose, rate and acceleration of driving bases follow, shape (Q, N, 30).
     """
     Q, N = signals.phi.shape[:2]
     angles = signals.with_rates(signals.phi), signals.with_rates(signals.theta)
