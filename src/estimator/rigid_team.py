@@ -343,8 +343,8 @@ def pose_error(R: Array, h: Array, shared: Shared, bases: Bases) -> Array:
 def robot_data(s: Array, arms: Arms) -> ArmData:
     """Return poses in level base frames, twists and wrenches of robots with true signals s, shape (Q, ..., 21).
 
-    ``arms`` describes one robot, or all robots in the axis before the last. With driving bases, s has 30 entries, the last
-    nine as ``arm_data`` takes them; poses then are in the base frames at the start.
+    ``arms`` describes one robot, or all robots in the axis before the last. With driving bases, s has 30 entries, the
+    last nine as ``arm_data`` takes them; poses then are in the base frames at the start.
     """
     phi, phi_dot, phi_ddot, theta, theta_dot, theta_ddot, tau, *_ = np.moveaxis(
         s.reshape(*s.shape[:-1], -1, 3), -2, 0
