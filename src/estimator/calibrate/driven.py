@@ -75,9 +75,9 @@ class Driven:
 
     def in_time(self) -> Driven:
         """Return the rows in order of time."""
-        order = np.argsort(self.time)
-        parts = (self.by_states, self.by_scales, self.by_jolts, self.moved, self.time)
-        return Driven(*(x[order] for x in parts), self.first)
+        k = np.argsort(self.time)
+        parts = self.by_states[k], self.by_scales[k], self.by_jolts[k], self.moved[k], self.time[k]
+        return Driven(*parts, self.first)
 
     def chain(self, drift: Drift) -> tuple[Array, Array]:
         """Return transition from the row before (n, 6 N, 6 N) and precision of what is new in a row (n, 6 N).
