@@ -12,7 +12,7 @@ Eliminating the states (block LDL^T, as in a Kalman smoother) leaves the sum of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -75,12 +75,9 @@ class Driven:
 
     def in_time(self) -> Driven:
         """Return the rows in order of time."""
-        order = np.argsort(self.time)
-        parts = {
-            name: getattr(self, name)[order]
-            for name in ("by_states", "by_scales", "by_jolts", "moved", "time")
-        }
-        return replace(self, **parts)
+        k = np.argsort(self.time)
+        parts = self.by_states[k], self.by_scales[k], self.by_jolts[k], self.moved[k], self.time[k]
+        return Driven(*parts, self.first)
 
     def chain(self, drift: Drift) -> tuple[Array, Array]:
         """Return transition from the row before (n, 6 N, 6 N) and precision of what is new in a row (n, 6 N).

@@ -5,12 +5,10 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from discrepancy.team.causes.base import Cause, ReadingError, one_joint, one_robot, stack
-from discrepancy.team.causes.friction import in_parts, pieces_while, played
-from discrepancy.team.linear.rows import PATCH_COLUMNS
+from discrepancy.team.causes.friction import played
 from estimator.arm.delta import LEG_DIRECTIONS, jacobian_of, leg_geometry
 from estimator.arm.motion import PHI
 from estimator.arm.unit import ArmUnit, design_of
@@ -86,9 +84,6 @@ class ThetaZero(ReadingError):
 PLAY_STEP_RAD, CROSSING_S = 1e-4, 0.3
 """Change of a reading that is more than noise [rad], and longest time in which a joint crosses the play [s]. Chosen: a
 step of a 16-bit encoder; commanded motion turns round by 5 mrad in a quarter of a second."""
-BESIDE_S, CROSSING_KNOTS_S, CROSSING_OPEN = 0.05, 0.05, 0.2
-"""Time beside a crossing and between knots of what it leaves open [s], and standard deviation of that over the play.
-Chosen: the reading's last step comes up to 20 ms before the turn."""
 
 
 class EncoderPlay(ReadingError):
@@ -109,34 +104,25 @@ class EncoderPlay(ReadingError):
         return f"the encoder of the gimbal joint has {n('play_rad', 'mrad', 1e3)} of play"
 
     def errors(self, signals, robot, joint, shape, arm):
-        way, _ = _way_behind(signals.theta[:, robot, joint], signals.rate_hz)
+        way = _way_behind(signals.theta[:, robot, joint], signals.rate_hz)
         return [{"theta": one_joint(-0.5 * way, joint)}]
 
-    def unknowns(self, trial, robot, joint, shape):
-        """While the joint crosses the play, its place there may differ from the law's."""
-        rate_hz = trial.signals.rate_hz
-        _, crosses = _way_behind(trial.signals.theta[:, robot, joint], rate_hz)
-        pieces = in_parts(pieces_while(crosses, rate_hz, CROSSING_KNOTS_S), PATCH_COLUMNS)
-        return trial.of_misreadings(robot, joint, ((at, CROSSING_OPEN * values) for at, values in pieces))
 
-
-def _way_behind(reading: Array, rate_hz: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Place of a joint in the play of its encoder by the readings, -1 to 1, and where it crosses, shape (Q,) each.
+def _way_behind(reading: Array, rate_hz: float) -> Array:
+    """Place of a joint in the play of its encoder by the readings, -1 to 1, shape (Q,).
 
     It is that of the last motion. After a turn the reading stands still while the joint crosses the play, with constant
     acceleration. Before the first motion the encoder is amid its play.
     """
     sign = np.sign(np.diff(played(reading, PLAY_STEP_RAD), prepend=reading[0]))
     moves = np.flatnonzero(sign)
-    way, crosses, before = np.zeros(len(reading)), np.zeros(len(reading), dtype=bool), 0.0
-    beside = round(BESIDE_S * rate_hz)
+    way, before = np.zeros(len(reading)), 0.0
     for k in np.flatnonzero(np.diff(sign[moves], prepend=0.0)):
         now, after = moves[k], sign[moves[k]]
         start = max(0 if not k else moves[k - 1], now - round(CROSSING_S * rate_hz))
         way[start:now] = before + (after - before) * np.linspace(0.0, 1.0, now - start, endpoint=False) ** 2
         way[now:], before = after, after
-        crosses[max(0, start - beside) : now + beside] = True
-    return way, crosses
+    return way
 
 
 class SeaScale(ReadingError):
