@@ -250,10 +250,11 @@ def _team_wiring(found: Inspection) -> Iterator[str]:
         moving = [value for name, value in misfit.scaled.items() if name not in ("force", "moment")]
         together = misfit.determined and not misfit.faults and max(moving, default=0.0) ** 2 < SUSPICIOUS
         hint = ": they move together, so does the log lack a robot, or does something else carry or push?"
+        apart = "; if the payload has two bodies on a joint, `mocobot estimate` finds it"
         yield (
             f"{'even then the' if wiring.found else 'the'} channels do not fit robots that carry one rigid payload "
             f"({evidence(misfit)}), and no {'other ' if wiring.found else ''}mistake that is looked for explains it"
-            f"{hint if together else ''}"
+            f"{hint if together else apart}"
         )
 
 
