@@ -267,7 +267,9 @@ def main() -> None:
     first = kept(folder, "first", first_pass)
     spread = spread_of(kept(folder, "teams", teams))
     print(json.dumps(spread))
-    names = list(SIZES)
+    names = [name for name, sizes in SIZES.items() if all(first[f"{name} {sizes[1]:g}"].values())]
+    for name in SIZES.keys() - set(names):
+        print(f"{name}: no estimate from {SIZES[name][1]:g} on, so it is in no fit")
     model = Model(first, names)
     print({name: round(power, 2) for name, power in model.power.items()})
     print(line("clean", {}, chi2s(first["clean"], spread)))

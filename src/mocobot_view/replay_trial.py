@@ -130,7 +130,7 @@ def replay_trial(
         recording, name: one trial, and the name of its replay.
         estimate: estimate of the payload; None to estimate from this recording, as far as possible.
         truth, diagnosis: true payload, and diagnosis of these robots.
-        payload: name or MJCF of the payload's geometry; None for that of the recording's label.
+        payload: name or MJCF of the geometry of one rigid payload; None for that of the recording's label.
     """
     recording = as_estimated(recording, estimate)
     meta = recording.metadata
@@ -152,8 +152,10 @@ def replay_trial(
     grasps = held(facts, meta.robots)
     bases, motion = placed(R_bi, wrist, grasps, height, meta.arms)
     two = None
-    if meta.trial != FREE and (motion is None or _misfits(motion)):
+    if meta.trial != FREE and payload is None and (motion is None or _misfits(motion)):
         two = two_body_motion(recording, R_bi, wrist, height)
+    if two is not None and _misfits(two.first):
+        two = None
     if two is not None and motion is not None:
         gap, left = rms(motion.gap_position_m), rms(two.first.gap_position_m)
         two = two if left < gap / BETTER else None

@@ -96,7 +96,7 @@ def test_drives_have_the_same_bits_without_numba(monkeypatch):
     rng = np.random.default_rng(4)
     addresses = [rng.permutation(20)[:8].reshape(2, 4) for _ in range(3)]
     fixed = [rng.standard_normal(20), rng.standard_normal(20)]
-    kinematics = [rng.standard_normal((4, 3)), rng.standard_normal((3, 4)), (2.0, 1.5, 4.0, 3.0, 1e-3)]
+    kinematics = [rng.standard_normal((2, 4, 3)), rng.standard_normal((2, 3, 4)), (2.0, 1.5, 4.0, 3.0, 1e-3)]
     plan = [rng.standard_normal((2, 3)), rng.standard_normal((2, 3))]
     changed = [rng.standard_normal(shape) for shape in ((20,), (2, 3), (2, 4), (2, 4), (2, 4))]
 

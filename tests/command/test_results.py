@@ -360,7 +360,7 @@ def test_estimate_carries_it_and_is_the_same_bytes_again(biased_trials, tmp_path
     assert values["provenance"]["command"] == "estimate"
     assert values["provenance"]["options"] == {
         "map": None, "episode": None, "method": "auto", "cutoff_hz": 4.0, "calibration": None, "self_calibrate": False,
-        "max_unpacked": None,
+        "max_unpacked": None, "payload": "auto",
     }  # fmt: skip
     assert [entry["path"] for entry in values["provenance"]["files"]] == [str(biased_trials[0])]
     read_estimate(out[0])  # as replay reads it

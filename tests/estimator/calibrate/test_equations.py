@@ -289,7 +289,7 @@ def test_gimbals_near_zero(shift):
         ArmUnit(DESIGN, 0.0 * units.x), held.shared, exact.bases
     )
     for part in rowed:
-        assert np.isfinite(part).all()
+        assert part is None or np.isfinite(part).all()
     assert (np.linalg.eigvalsh(rowed.covariance) > 0).all()
 
 

@@ -232,8 +232,8 @@ class Tick:
 
     def go(self, pose: np.ndarray, twist: np.ndarray) -> None:
         update_drives(
-            self.qpos, self.qvel, self.ctrl, self.at, self.at, self.at, self.kinematics.matrix,
-            self.kinematics.inverse, self.constants, pose[None], twist[None],
+            self.qpos, self.qvel, self.ctrl, self.at, self.at, self.at, self.kinematics.matrix[None],
+            self.kinematics.inverse[None], self.constants, pose[None], twist[None],
             self.odometry, self.angle, self.lag, self.speed,
         )  # fmt: skip
 

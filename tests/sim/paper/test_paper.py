@@ -428,7 +428,7 @@ def test_parts_of_trials_count(
     monkeypatch.setattr(shares_module, "EVERY_S", looks)
     recording = measure(random_a, sensor_preset("ideal"), np.random.default_rng(0), name="rec")
 
-    def simulate(*_: object, progress: Callable[[int, int], object]) -> Simulated:
+    def simulate(*_: object, progress: Callable[[int, int], object], **__: object) -> Simulated:
         for quarter in range(5):
             progress(100 * quarter, 400)
             time.sleep(3.0 * looks)
