@@ -92,7 +92,7 @@ class EncoderPlay(ReadingError):
     title = "play in the encoder of {gimbal axis}"
     family = "gimbal_zero"
     parameters = ("play_rad",)
-    tolerances = (1e-4,)
+    tolerances = (1e-5,)
     positive = ("play_rad",)
     clipped = ("play_rad",)
     at = "gimbal joint"
