@@ -24,7 +24,10 @@ LOGS = "a rosbag2 folder, .mcap or .db3, a CSV file (.csv, .tsv, .txt), an .npz 
 RESULTS = "paper.json of `mocobot paper --out`, diagnosis.json of `mocobot diagnose --out`, calibration.json of `mocobot calibrate --out`, campaign.json of `mocobot campaign --out`, or JSON files of `mocobot estimate --out`"  # noqa: E501
 FORCE = "exists; give --force to replace it, or name another file"
 INSIDE = "cannot be written (.../rec.parquet is a file)"
-PAYLOADS, PRESETS = "the payloads are a, b, c, d, flexible, folding, hinged, sliding", "the presets are ideal, nominal, uncalibrated"
+PAYLOADS, PRESETS = (
+    "the payloads are a, b, c, d, flexible, folding, hinged, sliding",
+    "the presets are ideal, nominal, uncalibrated",
+)
 
 WORDS = {
     "": "no command given; it must be one of example, inspect, map, convert, ...",

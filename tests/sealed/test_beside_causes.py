@@ -15,7 +15,9 @@ from sealed.sets import generate, plan
 def test_a_tether_of_the_payload_of_an_uncalibrated_team_is_as_near_as_its_errors_say():
     """Linear where the team is found without it, its pull down is 7 errors off, and all links are 1 % short."""
     one = Schedule(randoms=1, periodic_s=None, hold_s=None)
-    recordings, truth = generate(replace(plan("single", 176007, "uncalibrated", name="payload_tether"), schedule=one))
+    recordings, truth = generate(
+        replace(plan("single", 176007, "uncalibrated", name="payload_tether"), schedule=one)
+    )
     (hidden,) = truth["effects"]
     assert hidden["cause"] == "payload_tether"
     found = diagnose_team(recordings, closed_loop=False)

@@ -17,6 +17,8 @@ KNOT_S = 0.06
 MOST_KNOTS, MOST_IN_ALL = 12, 240
 """Cosines of one rest; more of them in long rests if those of all rests of a joint are fewer than the second number.
 Chosen: a command that steps while the joint sticks makes friction jump, and 240 cosines resolve 14 s of that."""
+AT_REVERSALS = (0, 1, 4, 5, 6)
+"""Deviations of ``other_forms`` that act near reversals only: presliding, rounded reversals, a delay."""
 
 
 def rests(v: Array, step_s: float, slow: float) -> list[tuple[int, int]]:

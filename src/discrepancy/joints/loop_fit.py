@@ -10,7 +10,7 @@ import numpy as np
 from discrepancy.joints.closed_loop import ClosedLoop
 from discrepancy.joints.fit import DETERMINED, FREE_GAIN, GAIN, LEARNING, Fit, HeldOut, Parameter, Scalar
 from discrepancy.joints.forecast import Forecasts, errors, machine
-from discrepancy.joints.friction import deviations, polynomial
+from discrepancy.joints.friction import AT_REVERSALS, deviations, polynomial
 from discrepancy.joints.mechanics import Tree
 from discrepancy.joints.model import SerialModel
 from discrepancy.joints.problem import FORM, MOMENTS, JointProblem
@@ -225,7 +225,8 @@ class LoopFit(Fit):
             viscous = self.given.viscous[j] + own[f"{n} viscous_Nms_per_rad"]
             torque = [coulomb * s.direction + viscous * s.v for s in signals]
             forms = deviations(signals, float(tree.coulomb[j]), float(tree.viscous[j]), FORM, servo=True)
-            told = {f"{n} form {i}": form for i, form in enumerate(forms) if f"{n} form {i}" in size}
+            told = {f"{n} form {i}": form for i, form in enumerate(forms) if i not in AT_REVERSALS}
+            told = {label: form for label, form in told.items() if label in size}
             for label, form in told.items():
                 torque = [t + size[label] * f for t, f in zip(torque, form, strict=True)]
             if told:

@@ -171,7 +171,7 @@ def test_robots_of_a_seed_carry_every_payload() -> None:
 
 @pytest.mark.slow
 def test_trials_stay_within_the_papers_limits(result: PaperResult) -> None:
-    assert len(result.trials) == 4 * 2 * (2 + 1 + 1)
+    assert len(result.trials) == 4 * 3 * (2 + 1 + 1)
     for trial in result.trials:
         assert 3.0 < trial.rotation_deg < 10.0, trial.name
         assert trial.torque_Nm < 20.0, trial.name
