@@ -15,8 +15,9 @@ MERGE_S = 0.025
 KNOT_S = 0.06
 """Time at rest for each cosine of the friction [s]. Derived: half a period of the rows' highest frequency, 10 Hz."""
 MOST_KNOTS, MOST_IN_ALL = 12, 240
-"""Cosines of one rest; more of them in long rests if those of all rests of a joint are fewer than the second number.
-Chosen: a command that steps while the joint sticks makes friction jump, and 240 cosines resolve 14 s of that."""
+"""Cosines of one rest; where commands tell the torque, more of them in long rests if those of all rests of a joint are
+fewer than the second number. Chosen: a command that steps while the joint sticks makes friction jump, and 240 cosines
+resolve 14 s of that."""
 AT_REVERSALS = (0, 1, 4, 5, 6)
 """Deviations of ``other_forms`` that act near reversals only: presliding, rounded reversals, a delay."""
 
@@ -55,7 +56,7 @@ def direction(v: Array, step_s: float, slow: float) -> Array:
     return out
 
 
-def resting(v: Array, step_s: float, slow: float) -> tuple[list[list[tuple[int, Array]]], list[Array]]:
+def resting(v: Array, step_s: float, slow: float, most: int = 0) -> tuple[list[list[tuple[int, Array]]], list[Array]]:
     """Deviations of a unit Coulomb friction from the linear course during rests and reversals.
 
     Returns:
@@ -69,7 +70,7 @@ def resting(v: Array, step_s: float, slow: float) -> tuple[list[list[tuple[int, 
     for a, b in found:
         n = b - a
         place = (np.arange(n) + 0.5) / n
-        knots = min(int(n * step_s / KNOT_S), max(MOST_KNOTS, MOST_IN_ALL * n // total))
+        knots = min(int(n * step_s / KNOT_S), max(MOST_KNOTS, most * n // total))
         cosines = [np.cos(np.pi * k * place) for k in range(max(3, 1 + knots))]
         before, after = ends(v, a, b)
         if not np.isnan(before):

@@ -667,8 +667,9 @@ class _Builder:
     def _rests(self, j: int) -> None:
         columns, unit, turns = [], [], []
         common: list[list[Array]] = [[], [], []]
+        most = friction.MOST_IN_ALL if any(s.by_command is not None for s in self.parts) else 0
         for t, s in enumerate(self.joints[j]):
-            own, shared = friction.resting(s.v, s.step_s, self.slow[j])
+            own, shared = friction.resting(s.v, s.step_s, self.slow[j], most)
             for k in range(3):
                 common[k].append(shared[k])
             for number, rest in enumerate(own):
