@@ -26,6 +26,8 @@ LATE_S = 0.02
 """Prior standard deviation of the delay of commands [s]. Chosen: that of a busy bus."""
 WIDE = 1.5
 """Least factor on standard errors that is told. Chosen: ten values of two parts scatter by less than that."""
+LEAST_DROP = 1.0
+"""Drop of the log likelihood for which a step is halved [nat]. Chosen: no data tell less."""
 REST_SHARE = 0.05
 """Least friction at rest over the rms torque. Chosen."""
 
@@ -127,7 +129,7 @@ class LoopFit(Fit):
             (loop, filtered, own) for (loop, filtered), own in zip(self.options.loops, lacking, strict=True)
         ]
         likelihood = sum(filtered.log_density(own, loop.off) for loop, filtered, own in every)
-        if self.steps > LEARNING + 1 and likelihood < self.likeliest[0]:
+        if self.steps > LEARNING + 1 and likelihood < self.likeliest[0] - LEAST_DROP:
             _, x, motions = self.likeliest
             moved = float(np.max(np.abs(begun[0] - x) / np.sqrt(np.diag(self.covariance)))) / 2.0
             self.x = 0.5 * (begun[0] + x)
