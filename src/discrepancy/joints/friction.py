@@ -56,7 +56,9 @@ def direction(v: Array, step_s: float, slow: float) -> Array:
     return out
 
 
-def resting(v: Array, step_s: float, slow: float, most: int = 0) -> tuple[list[list[tuple[int, Array]]], list[Array]]:
+def resting(
+    v: Array, step_s: float, slow: float, most: int = 0
+) -> tuple[list[list[tuple[int, Array]]], list[Array]]:
     """Deviations of a unit Coulomb friction from the linear course during rests and reversals.
 
     Returns:
