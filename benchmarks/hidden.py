@@ -28,7 +28,6 @@ from mocobot_sim.trial.truth import GroundTruth
 LIMITS: dict[str, dict[str, float]] = {
     "phi_zero": {"zero_rad": 6.6e-4},
     "theta_zero": {"zero_rad": 6.2e-4},
-    "encoder_play": {"play_rad": 5.0e-4},
     "link_length": {"proximal_m": 1.3e-4, "rod_m": 1.5e-4, "base_radius_m": 1.4e-4},
     "base_tilt": {"roll_rad": 7.0e-4, "pitch_rad": 7.0e-4},
     "base_creep": {"x_mps": 1.7e-7, "y_mps": 1.6e-7},
@@ -51,6 +50,7 @@ LIMITS: dict[str, dict[str, float]] = {
     "drag": {"coefficient_Ns_per_m": 0.33},
     "slosh": {"mass_kg": 3.4e-3},
     "payload_mass": {"mass_kg": 4.2e-3},  # in a minute
+    "encoder_play": {"play_rad": 5.0e-4},
 }
 
 PENDULUM_LENGTHS_M = (0.08, 0.11, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5)

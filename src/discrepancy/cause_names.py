@@ -11,7 +11,6 @@ from estimator.strict import is_number, read_toml
 TEAM = (
     "phi_zero",
     "theta_zero",
-    "encoder_play",
     "link_length",
     "base_tilt",
     "base_creep",
@@ -34,6 +33,7 @@ TEAM = (
     "drag",
     "slosh",
     "payload_mass",
+    "encoder_play",
 )
 """Causes of a team in the order of the documentation, as in ``discrepancy.team.causes``."""
 

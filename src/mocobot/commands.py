@@ -95,7 +95,8 @@ def estimate(options: opt.Estimate) -> None:
     notes: list[str] = []
     with stages() as (say, _):
         found = mocobot.estimate(options.rec, options, say=say, note=notes.append)
-    text = str(found) if isinstance(found, mocobot.Estimate) else found.beside_truth(Path(options.rec[0]))
+    two = isinstance(found, mocobot.TwoBodyEstimate)
+    text = found.beside_truth(Path(options.rec[0])) if two else str(found)
     if options.out or options.json:
         values = found.to_dict() | {"provenance": provenance("estimate", options, inputs_of(options))}
         if options.pictures and options.out:
@@ -103,16 +104,16 @@ def estimate(options: opt.Estimate) -> None:
                 write_json(folder / "estimate.json", values)
                 write_text(folder / "report.txt", f"{text}\n")
                 notes += (
-                    _team_picture(options, found, folder / "team.png")
-                    if isinstance(found, mocobot.Estimate)
-                    else ["A payload of two bodies is not drawn."]
+                    ["A payload of two bodies is not drawn."]
+                    if two
+                    else _team_picture(options, found, folder / "team.png")
                 )
         for path in _paths(options.json, None if options.pictures else options.out):
             write_json(path, values)
     print("\n".join([*notes, text]))
     if options.strict and found.flags:
         raise NotGood(f"the estimate is flagged: {found.flags[0]}")
-    if options.strict and isinstance(found, mocobot.Estimate) and found.mass is None and found.grasps is None:
+    if options.strict and not two and found.mass is None and found.grasps is None:
         raise NotGood("the recordings determine neither mass nor grasps")
 
 

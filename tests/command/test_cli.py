@@ -390,7 +390,7 @@ def test_a_verdict(brief, capsys, monkeypatch, verdict, strict):
 
 def test_an_estimate_that_says_nothing(brief, capsys, monkeypatch):
     """Flagged ones: test_cli."""
-    nothing = SimpleNamespace(flags=(), mass=None, grasps=None, beside_truth=lambda _: "")
+    nothing = SimpleNamespace(flags=(), mass=None, grasps=None)
     monkeypatch.setattr("mocobot.estimate", lambda *_, **__: nothing)
     assert run(capsys, "estimate", brief)[0] == 0
     code, _, err = run(capsys, "estimate", brief, "--strict")

@@ -27,9 +27,9 @@ from discrepancy.team.causes.slosh import Slosh
 from discrepancy.team.causes.yielding import BaseCompliance, BaseCreep, GraspFlex, GraspPlay
 
 CATALOGUE = (
-    PhiZero, ThetaZero, EncoderPlay, LinkLength, BaseTilt, BaseCreep, BaseCompliance, SeaScale, SeaBias, SeaHardening,
+    PhiZero, ThetaZero, LinkLength, BaseTilt, BaseCreep, BaseCompliance, SeaScale, SeaBias, SeaHardening,
     SeaHysteresis, JointFriction, GimbalFriction, TorqueSkew, TorqueLag, SensorLag, ClockDelay, GraspFlex,
-    GraspPlay, Tether, PayloadTether, Push, Drag, Slosh, PayloadMass,
+    GraspPlay, Tether, PayloadTether, Push, Drag, Slosh, PayloadMass, EncoderPlay,
 )  # fmt: skip
 CAUSES: dict[str, Cause] = {cause.name: cause() for cause in CATALOGUE}
 """Every cause by its name."""
