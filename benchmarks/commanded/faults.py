@@ -3,7 +3,7 @@
     python benchmarks/commanded/faults.py FOLDER --first 560 --machines 6
     python benchmarks/commanded/faults.py FOLDER --show
 
-Of each machine, ``calibrate`` fits the two runs of its healthy days. Then each fault is put into it, and ``diagnose``
+For each machine, ``calibrate`` fits the two runs of its healthy days. Then each fault is put into it, and ``diagnose``
 reads the held-out run of that machine with ``as_found.xml`` and the ``log.toml`` beside it. A fault is **named** if it
 is among the causes named, at its joint. A diagnosis is **falsely certain** if it has a cause at 99 % or more that the
 machine does not have. Machines of the laws M4 to M6 have friction that no MJCF holds beside the fault; causes of
