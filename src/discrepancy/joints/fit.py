@@ -341,7 +341,8 @@ class Fit:
         """Set, in place, the prior variance of each deviation of friction from its law to its likeliest, often zero.
 
         One at a time, the most profitable first: M. E. Tipping and A. C. Faul, "Fast marginal likelihood maximisation
-        for sparse Bayesian models", AISTATS 2003. One counts if its evidence exceeds the odds against one of a joint.
+        for sparse Bayesian models", AISTATS 2003. A deviation is in the fit only if it raises the log evidence
+        by more than the log of the number of deviations of a joint, of which any one is as likely as another.
         """
         forms = np.flatnonzero([" form " in n for n in self.problem.labels] & (slabs > 0.0))
         variance, prior = floor_of(self.problem, slabs), np.zeros(len(forms))
@@ -363,7 +364,7 @@ class Fit:
 
             best = np.where(worth(best) > 0.0, best, 0.0)
             gained = worth(best) - worth(prior)
-            k = int(np.argmax(gained)) if len(forms) else 0
+            k = int(np.argmax(gained))
             if gained[k] < LEAST_NATS:
                 break
             prior[k] = best[k]

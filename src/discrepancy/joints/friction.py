@@ -61,6 +61,12 @@ def resting(
 ) -> tuple[list[list[tuple[int, Array]]], list[Array]]:
     """Deviations of a unit Coulomb friction from the linear course during rests and reversals.
 
+    Args:
+        v: velocity, shape (W,).
+        step_s: time between samples [s].
+        slow: speed below which the sign of the velocity is unreliable.
+        most: cosines that all rests together may have, where that is more than ``MOST_KNOTS`` for one of them.
+
     Returns:
         For each rest, pairs of its first sample and a series, the k-th with standard deviation 1 / sqrt(3 (1 + k)); and
         series (W,) that are common to all reversals.
