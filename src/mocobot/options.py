@@ -454,7 +454,7 @@ class Paper(Options):
     def check(self) -> None:
         """Raise InputError if a payload does not exist or a number is out of range."""
         for payload in self.payload:
-            payload_path(payload)
+            payload_path(payload, rigid=True)
         check_range(self, "jobs", 1)
 
 

@@ -91,7 +91,8 @@ SIMULATE = {
 """Options of ``simulate``."""
 
 PAPER = {
-    "--payload a x": f"payload 'x' does not exist; {PAYLOADS}",
+    "--payload a x": "payload 'x' does not exist; the payloads are a, b, c, d",
+    "--payload hinged": "payload 'hinged' has two bodies; the payloads are a, b, c, d",
     "--payload a b a": "--payload is 'a b a'; give each once",
     "--payload": "no payload given; name at least one",
     "--preset perfect": f"preset 'perfect' does not exist; {PRESETS}",

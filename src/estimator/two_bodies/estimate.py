@@ -79,9 +79,10 @@ def _checked(found: Sequence[Candidate], kind: Kind, names: str) -> Candidate:
             "explains better); move them against each other, or use --payload rigid"
         )
     if best.motion == "loose" or best.noise > EXPLAINED:
+        lacking = {"hinged": "no hinge", "sliding": "no slide"}.get(kind, "no hinge and no slide")
         raise InputError(
-            f"{names}: no hinge and no slide explains how the robots move against each other (the best leaves "
-            f"{joint.noise:.2g} times the encoders' noise); did a robot or a grasp move, or are there three bodies?"
+            f"{names}: {lacking} explains how the robots move against each other (the best leaves {joint.noise:.2g} "
+            f"times the encoders' noise); did a robot or a grasp move, or are there three bodies?"
         )
     if best.axis_se_rad > MOST_AXIS_RAD:
         raise InputError(

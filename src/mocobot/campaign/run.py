@@ -87,14 +87,20 @@ class CampaignPlan(CampaignOptions):
         """Make the plan of the given options.
 
         Raises:
-            InputError: the preset draws its own robots, or the number of units does not fit the payload.
+            InputError: the preset draws its own robots, the payload has two bodies, or the number of units does not
+                fit it.
         """
         if not sensor_preset(options.preset).calibrated:
             raise InputError(
                 f"preset is {options.preset}, which draws robots of its own; use nominal, and --background uncalibrated"
             )
         units = () if options.units is None else read_units(options.units)
-        robots = build_team(options.payload).robots
+        team = build_team(options.payload)
+        robots = team.robots
+        if team.payload_joint is not None:
+            raise InputError(
+                f"payload is {options.payload}, which has two bodies; a campaign needs a rigid payload"
+            )
         if units and len(units) != robots:
             raise InputError(
                 f"{options.units}: has {len(units)} robots; the payload {options.payload} is carried by {robots}"

@@ -156,7 +156,7 @@ class PaperPlan:
     def __post_init__(self) -> None:
         """Check the options."""
         for payload in self.payloads:
-            payload_path(payload)
+            payload_path(payload, rigid=True)
         for preset in self.presets:
             preset_named(preset)
         for name, values in (("payload", self.payloads), ("preset", self.presets)):

@@ -29,6 +29,7 @@ from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
 from estimator.strict import Fields, read_toml
 from mocobot_sim.scene.as_built import AsBuilt, theta_x_zeros, units_of
+from mocobot_sim.scene.models import RIGID
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class PayloadTruth:
         return T
 
 
-PAYLOADS = ("a", "b", "c", "d")
+PAYLOADS = RIGID
 _FILE = Path(__file__).with_name("published.toml")
 _TRUTH = (
     "R_12_deg", "R_23_deg", "R_31_deg", "p_12_m", "p_23_m", "p_31_m", "mass_kg", "p_1c_m", "R_1c_deg", "principal_kgm2"

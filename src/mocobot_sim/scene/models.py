@@ -37,14 +37,20 @@ def payload_names() -> list[str]:
     return sorted(path.name.removeprefix("payload_") for path in models_dir().glob("payload_*"))
 
 
-def payload_path(name: str) -> Path:
-    """Path of the MJCF file of a shipped payload.
+RIGID = ("a", "b", "c", "d")
+"""Shipped payloads of one body."""
+
+
+def payload_path(name: str, *, rigid: bool = False) -> Path:
+    """Path of the MJCF file of a shipped payload, with ``rigid`` of one body.
 
     Raises:
-        InputError: there is no payload of that name.
+        InputError: there is no such payload of that name.
     """
-    if name not in payload_names():
-        raise InputError(f"payload {name!r} does not exist; the payloads are {', '.join(payload_names())}")
+    names = RIGID if rigid else payload_names()
+    if name not in names:
+        what = "has two bodies" if name in payload_names() else "does not exist"
+        raise InputError(f"payload {name!r} {what}; the payloads are {', '.join(names)}")
     return models_dir() / f"payload_{name}" / "payload.xml"
 
 
