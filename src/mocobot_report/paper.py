@@ -38,7 +38,7 @@ SENSORS = {
     "ideal": "exact sensors",
     "nominal": "16-bit encoders and noisy torques in steps of 0.01 N m",
     "uncalibrated": "the same on robots with calibration errors of about 1 deg, 2 % of spring stiffness and 1 mm",
-    SCATTERED: "the uncalibrated team with play of its gimbals' encoders and the like, which scatter its trials",
+    SCATTERED: "the uncalibrated team with encoder zeros that differ from trial to trial",
     ONE_FIT: "the nominal team, estimated by one fit of three trials in place of the paper's stages",
     SELF_CALIBRATED: "the uncalibrated team, calibrated on three of its own recordings and nothing else",
     TRANSFER: "the uncalibrated team as one payload has calibrated it, carrying the others",
