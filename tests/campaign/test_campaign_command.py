@@ -191,6 +191,7 @@ def test_the_command_writes_everything_and_goes_on(tmp_path, monkeypatch, capsys
         (("--calibration", "c.json"), "say with --units"),
         (("--units", "nowhere.json"), "there is no such file"),
         (("--payload", "e"), "'e'"),
+        (("--payload", "hinged"), "which has two bodies; a campaign needs a rigid payload"),
         (("--background", "calibrated", "calibrated"), "twice"),
         (("--causes", "sea_baas"), "cause 'sea_baas' does not exist"),
         (("--causes", "drag", "--exclude", "drag"), "both to be hidden and excluded"),

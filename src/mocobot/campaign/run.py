@@ -97,7 +97,7 @@ class CampaignPlan(CampaignOptions):
         units = () if options.units is None else read_units(options.units)
         team = build_team(options.payload)
         robots = team.robots
-        if team.payload_joint is not None:
+        if team.payload_joint() is not None:
             raise InputError(
                 f"payload is {options.payload}, which has two bodies; a campaign needs a rigid payload"
             )
