@@ -42,7 +42,7 @@ NAV = {
     ],
     "Simulate": ["simulation.md", "base.md", "effects.md"],
     "Logs": ["recording.md", "measured-data.md", "inspect.md", "commands/watch.md"],
-    "Estimate": ["method.md", "method-arm.md"],
+    "Estimate": ["method.md", "payloads.md", "method-arm.md", "paper.md"],
     "Calibrate": ["calibration.md", "calibration"],
     "Diagnose": ["diagnosis", "serial", "commands/campaign.md"],
     "Show": ["replay.md", "report.md", "commands/comparison.md", "commands/cluster.md"],
