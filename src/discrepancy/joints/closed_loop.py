@@ -73,6 +73,7 @@ class ClosedLoop:
         reading: variance of the readings at rest, shape (J,) [rad^2].
         jitter: variance of the time at which a position was read, shape (J,) [s^2].
         torque: variance of unexplained torque over one second, shape (J,) [(N m)^2 s].
+        limit: largest torque of the drives, inf where they have none, shape (J,) [N m or N].
     """
 
     signals: Signals
@@ -84,6 +85,7 @@ class ClosedLoop:
     reading: Array
     jitter: Array
     torque: Array
+    limit: Array
 
     @classmethod
     def of(cls, s: Signals) -> ClosedLoop:
@@ -100,6 +102,7 @@ class ClosedLoop:
         return cls(
             s, first, every, way(time), way(time, 1), measured, noise,
             np.full(len(size), FIRST_JITTER_S**2), FIRST_SHARE**2 * size * log.period_s,
+            _limits(log),
         )  # fmt: skip
 
     @property
@@ -143,11 +146,12 @@ class ClosedLoop:
         torque = np.clip(asked, -limit, limit) * on
         free = (np.abs(asked) < limit) * on
         by_delay = -free * kp * (after - before) / (2.0 * DELAY_STEP_S)
+        by_limit = -np.sign(asked) * np.where(np.abs(asked) < limit, 0.0, _limits(log)) * on
         ones = np.ones(q.shape, dtype=bool)
         return replace(
             self.signals, rate_hz=1.0 / h, time=time, q=q, dq=dq, ddq=ddq, torque=torque, usable=ones,
-            inverse=inverse_torque(model.model, q, dq, ddq), by_delay=by_delay, by_command=None, enabled=None,
-            spoilt=None,
+            inverse=inverse_torque(model.model, q, dq, ddq), by_delay=by_delay, by_limit=by_limit, by_command=None,
+            enabled=None, spoilt=None,
         )  # fmt: skip
 
     def thinned(self, seen: Signals) -> Signals:
@@ -170,14 +174,13 @@ class ClosedLoop:
         on = np.ones((steps, 1))
         if log.enabled is not None:
             on[:, 0] = log.enabled[self.first + np.arange(steps) // self.every]
-        limit = np.where(np.isnan(d.limit), np.inf, d.limit)
-        return d.position_gain, np.nan_to_num(d.velocity_gain), limit, on
+        return d.position_gain, np.nan_to_num(d.velocity_gain), self.limit, on
 
     @property
     def plain(self) -> Array:
         """The loops as the log's map has them: gains, no torque added, and limit, shape (J, 4)."""
-        kp, kd, limit, _ = self.gains(1)
-        return np.column_stack([kp, kd, np.zeros(len(kp)), limit])
+        kp, kd, _, _ = self.gains(1)
+        return np.column_stack([kp, kd, np.zeros(len(kp)), _limits(self.signals.log)])
 
     def told(self, late: Array) -> tuple[Array, Array]:
         """Commanded positions and torques beside them, means over each step, shape (N, J) each."""
@@ -333,6 +336,11 @@ def estimated(model: SerialModel, trials: Trials) -> Trials:
         share = len(runs[k].time) / len(trials.runs[k].time)
         parts.append((k, slice(round(at.start * share), round(at.stop * share))))
     return replace(trials, runs=tuple(runs), parts=tuple(parts), noise=(), kept=())
+
+
+def _limits(log: JointLog) -> Array:
+    """Largest torque of each drive by the map, inf where it tells none, shape (J,)."""
+    return np.where(np.isnan(log.drive.limit), np.inf, log.drive.limit)
 
 
 def _reading(log: JointLog) -> Array:

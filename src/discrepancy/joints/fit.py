@@ -206,6 +206,7 @@ class Fit:
             if len(self.known) > 1 or gain == FREE_GAIN:
                 yield Scalar(f"{n} scale", n, "gain", 0.0, gain, in_model=False)
             yield Scalar(f"{n} delay_s", n, "delay_s", 0.0, self.late_s, in_model=False)
+            yield from self.more_scalars(j)
         for j, n in enumerate(self.model.joints):
             if j:
                 yield Scalar(f"{n} zero", n, "zero_rad", 0.0, ZERO_RAD)
@@ -222,6 +223,10 @@ class Fit:
         if t.gravity.any():
             for i in range(2):
                 yield Scalar(f"tilt {i}", "base", f"tilt_{i + 1}_rad", 0.0, TILT_RAD)
+
+    def more_scalars(self, j: int) -> Iterator[Scalar]:
+        """Further parameters of a joint's drive."""
+        yield from ()
 
     def gain_prior(self, j: int) -> float:
         """Prior standard deviation of the relative error of a joint's torque."""
@@ -491,7 +496,7 @@ class Fit:
             table = s.name.split("_", 1)[0]
             if s.label.endswith((" coulomb_Nm", " viscous_Nms_per_rad", " armature_kgm2")):
                 tables[table][self.model.joints.index(s.place)] += value
-            elif s.name in ("gain", "delay_s", "zero_rad") or s.name.startswith(("position", "tilt")):
+            elif s.name in ("gain", "delay_s", "limit", "zero_rad") or s.name.startswith(("position", "tilt")):
                 self.values[s.label] = float(value)
         self.tree = replace(self.given, mass=mass, com=com, inertia=inertia, **tables)
 
@@ -530,12 +535,13 @@ class Fit:
                 numbers = float(given[i]), float(value[i]), float(se[i]), float(prior[i])
                 yield Parameter(place, name, *numbers, bool(known[i]))
         n = self.first
-        se, prior = np.sqrt(np.diag(self.covariance)[n:]), np.sqrt(np.diag(self.prior)[n:])
+        slopes = self.scalar_slopes()
+        se, prior = (np.sqrt(np.diag(slopes @ x[n:, n:] @ slopes.T)) for x in (self.covariance, self.prior))
         for i, s in enumerate(self.scalars):
             yield self.told(s, float(self.x[n + i]), float(se[i]), float(prior[i]))
 
     def told(self, s: Scalar, value: float, se: float, prior: float) -> Parameter:
-        """A scalar as it is told, from its deviation, standard error and prior standard deviation."""
+        """A scalar as it is told, from its deviation, and its standard error and prior standard deviation as told."""
         joints = self.model.joints
         slide = s.place in joints and bool(self.model.slides[joints.index(s.place)])
         known, name = se < DETERMINED * prior, parameter_name(s.name, slide=slide)
@@ -552,11 +558,12 @@ class Fit:
         for k in range(len(self.bodies)):
             at = slice(10 * k, 10 * k + 10)
             slope[at, at] = _slope(central, self.x[at])
-        for i, p in enumerate([*self.parameters()][n:], n):
-            # An error of a gain divides it.
-            way = -1.0 if p.name.startswith("position_gain") else 1.0
-            slope[i, i] = way * p.se / np.sqrt(self.covariance[i, i])
+        slope[n:, n:] = self.scalar_slopes()
         return slope @ self.covariance @ slope.T
+
+    def scalar_slopes(self) -> Array:
+        """Derivatives of the scalars as they are told by their deviations, shape (S, S)."""
+        return np.eye(len(self.scalars))
 
     def combinations(self) -> Iterator[Combination]:
         """Base parameters of masses and rotors: pivoted QR of the columns the logs excite (M. Gautier, ICRA 1991)."""

@@ -28,6 +28,8 @@ WIDE = 1.5
 """Least factor on standard errors that is told. Chosen: ten values of two parts scatter by less than that."""
 LEAST_DROP = 1.0
 """Drop of the log likelihood for which a step is halved [nat]. Chosen: no data tell less."""
+LIMIT = 0.1
+"""Prior standard deviation of the relative error of a drive's largest torque. Chosen: that of a data sheet."""
 REST_SHARE = 0.05
 """Least friction at rest over the rms torque. Chosen."""
 
@@ -91,6 +93,12 @@ class LoopFit(Fit):
         """Prior standard deviation of the relative error of a joint's gains."""
         return GAIN if self.rough(j) == 1.0 else FREE_GAIN
 
+    def more_scalars(self, j: int) -> Iterator[Scalar]:
+        """The largest torque of a drive that reaches it."""
+        n, signals = self.model.joints[j], self.trials.runs
+        if any(s.by_limit is not None and s.by_limit[:, j].any() for s in signals):
+            yield Scalar(f"{n} limit", n, "limit", 0.0, LIMIT, in_model=False)
+
     def least_damping(self, j: int) -> float:
         """Least viscous friction of a joint: below none where the loop's velocity gain may be less than told."""
         return min(float(loop.damping[j]) for loop in self.loops)
@@ -98,6 +106,8 @@ class LoopFit(Fit):
     def linear(self) -> JointProblem:
         """Build the problem around the present motion."""
         late, scale = (self.each(what) for what in ("delay_s", "scale"))
+        for loop in self.loops:
+            loop.limit = loop.plain[:, 3] * (1.0 + self.each("limit"))
         runs = tuple(loop.seen(self.model, late) for loop in self.loops)
         pairs = []
         for loop, s in zip(self.loops, runs, strict=True):
@@ -176,13 +186,30 @@ class LoopFit(Fit):
         if s.name == "delay_s":
             told = float(np.nan_to_num(self.loops[0].signals.log.drive.delay_s[j]))
             s = replace(s, name="command_delay_s", model=told)
+        if s.name == "limit":
+            name = "limit_N" if self.model.slides[j] else "limit_Nm"
+            most, value = (float(x[j, 3]) for x in (self.loops[0].plain, self.servos()))
+            return Parameter(s.place, name, most, value, se, prior, se < DETERMINED * prior, in_model=False)
         if s.name != "gain" or self.rough(j) == 1.0:
             return super().told(s, value, se, prior)
-        gain, error = float(self.loops[0].signals.log.drive.position_gain[j]), 1.0 + value
-        slope = gain / error**2
+        gain = float(self.loops[0].plain[j, 0])
         name = "position_gain_N_per_m" if self.model.slides[j] else "position_gain_Nm_per_rad"
         known = se < DETERMINED * prior
-        return Parameter(s.place, name, gain, gain / error, slope * se, slope * prior, known, in_model=False)
+        return Parameter(s.place, name, gain, gain / (1.0 + value), se, prior, known, in_model=False)
+
+    def scalar_slopes(self) -> Array:
+        """Derivatives of the scalars as they are told by their deviations: an error of a gain divides gain and limit."""
+        out, at = super().scalar_slopes(), {s.label: i for i, s in enumerate(self.scalars)}
+        for s in self.scalars:
+            if s.name not in ("gain", "limit"):
+                continue
+            j = self.model.joints.index(s.place)
+            i, k, error = at[s.label], at[f"{s.place} scale"], 1.0 + self.each("scale")[j]
+            if s.name == "limit":
+                out[i, i], out[i, k] = self.loops[0].plain[j, 3] / error, -self.servos()[j, 3] / error
+            elif self.rough(j) != 1.0:
+                out[i, i] = -self.loops[0].plain[j, 0] / error**2
+        return out
 
     def servos(self) -> Array:
         """Position gain, velocity gain with negative damping, torque added, and largest torque, shape (J, 4)."""
@@ -288,7 +315,8 @@ class LoopFit(Fit):
             )
         wide = {name: factor for name, factor in self.widened.items() if factor > WIDE}
         if wide:
-            told = {described("command_delay_s" if n == "delay_s" else n)[0]: x for n, x in wide.items()}
+            own = {"delay_s": "command_delay_s", "limit": "limit_Nm"}
+            told = {described(own.get(n, n))[0]: x for n, x in wide.items()}
             listed = ", ".join(f"{name} {factor:.1f}" for name, factor in told.items())
             yield (
                 "Parts of the logs differ by more than their standard errors, so something acts that no parameter is. "

@@ -407,6 +407,9 @@ class _Builder:
                 self._braking(j)
             if self.commanded:
                 self._backlash(j)
+            limits = [s.by_limit for s in self.parts if s.by_limit is not None]
+            if limits:
+                self.add(f"{self.names[j]} limit", 0.0, {j: [x[:, j] for x in limits]})
         self._arm()
         if self.commanded and self.more.changed is None:
             self._stand()

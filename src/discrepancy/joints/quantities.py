@@ -6,7 +6,7 @@ WORDS = {
     "coulomb": "Coulomb friction", "viscous": "viscous friction", "armature": "reflected inertia",
     "offset": "torque offset", "gain": "torque gain", "delay": "torque delay", "command": "command", "zero": "zero",
     "position": "frame position", "braking": "back-EMF", "tilt": "tilt", "coupled": "coupled", "mass": "mass",
-    "com": "centre of mass", "inertia": "inertia",
+    "com": "centre of mass", "inertia": "inertia", "limit": "largest torque",
 }  # fmt: skip
 UNITS = {
     "Nms_per_rad": "N m s/rad", "Nm_per_rad": "N m/rad", "N_per_m": "N/m", "kgm2": "kg m^2",

@@ -56,6 +56,8 @@ class Signals:
         held: intervals of the log in which an encoder holds its last value.
         spoilt: samples that these intervals change by more than noise, shape (W,); None: no such samples.
         by_delay: residual torque per second of delay of the commands, shape (W, J); None: torques are logged.
+        by_limit: residual torque per share by which the largest torque of the drives is higher, shape (W, J); None: not
+            in a closed loop.
         by_command: part of the torque that comes with the command, gain times command, shape (W, J); None: torques are
             logged, or a closed loop has the delays.
     """
@@ -76,6 +78,7 @@ class Signals:
     held: tuple[Held, ...] = ()
     spoilt: NDArray[np.bool_] | None = None
     by_delay: Array | None = None
+    by_limit: Array | None = None
     by_command: Array | None = None
 
     @classmethod
