@@ -112,7 +112,7 @@ def deviations(
     signals: Sequence[JointSignals], coulomb: float, viscous: float, share: float, *, servo: bool
 ) -> list[list[Array]]:
     """The series of ``other_forms`` and, for a servo, of ``servo_forms``."""
-    servos = servo_forms(signals, coulomb, share) if servo else ()
+    servos = servo_forms(signals, coulomb, viscous, share) if servo else ()
     return [*other_forms(signals, coulomb, viscous, share, share), *servos]
 
 
@@ -162,7 +162,9 @@ def polynomial(signals: Sequence[JointSignals], torque: Sequence[Array], least: 
     return np.asarray(lsq_linear(A / size, y, bounds).x / size)
 
 
-def servo_forms(signals: Sequence[JointSignals], coulomb: float, share: float) -> Iterator[list[Array]]:
+def servo_forms(
+    signals: Sequence[JointSignals], coulomb: float, viscous: float, share: float
+) -> Iterator[list[Array]]:
     """Series of one standard deviation by which friction in a servo's gear may exceed Coulomb and viscous friction.
 
     With the square of the speed, more at low speed (Stribeck), more under torque, and the last two together: the laws
@@ -170,7 +172,7 @@ def servo_forms(signals: Sequence[JointSignals], coulomb: float, share: float) -
 
     Args:
         signals: signals of one joint, one for each log.
-        coulomb: Coulomb friction [N m].
+        coulomb, viscous: Coulomb friction [N m], and viscous friction, the drive's back-EMF included [N m s/rad].
         share: deviation relative to the friction, and to the torque.
     """
     yield [coulomb * s.v * np.abs(s.v) / s.span.speed**2 for s in signals]
@@ -180,3 +182,5 @@ def servo_forms(signals: Sequence[JointSignals], coulomb: float, share: float) -
         yield [share * x * np.abs(s.asked) for x, s in zip(slow, signals, strict=True)]
     for which in ("asked", "load"):
         yield [share * s.direction * np.abs(getattr(s, which)) for s in signals]
+    # A gear does not carry the back-EMF.
+    yield [share * s.direction * np.abs(s.asked - viscous * s.v) for s in signals]
