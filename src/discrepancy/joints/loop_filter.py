@@ -77,12 +77,6 @@ class Filtered:
         _filter((loop.A, loop.B), (self.gain, self.root), loop.every, np.ascontiguousarray(torque), y, out)
         return out
 
-    def log_density(self, torque: Array, position: Array) -> float:
-        """Log density of measurements, shape (M, J), given input torques, shape (N, J); without the constant in pi."""
-        roots = np.einsum("mjj->mj", self.root)
-        left = self.innovations(torque[:, :, None], position)
-        return float(np.sum(np.log(roots[roots > 0.0])) - 0.5 * np.sum(left**2))
-
     def smoothed(self, torque: Array, position: Array) -> Array:
         """Likeliest deviations at all grid points given the inputs and the measurements, shape (N + 1, 2J).
 

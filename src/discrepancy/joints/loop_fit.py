@@ -26,8 +26,8 @@ LATE_S = 0.02
 """Prior standard deviation of the delay of commands [s]. Chosen: that of a busy bus."""
 WIDE = 1.5
 """Least factor on standard errors that is told. Chosen: ten values of two parts scatter by less than that."""
-LEAST_DROP = 1.0
-"""Drop of the log likelihood for which a step is halved [nat]. Chosen: no data tell less."""
+FULL = LEARNING + 2
+"""Steps that are taken in full; the k-th after them counts 1 / (k + 1). Chosen: two with the noise held."""
 LIMIT = 0.1
 """Prior standard deviation of the relative error of a drive's largest torque. Chosen: that of a data sheet."""
 REST_SHARE = 0.05
@@ -76,7 +76,6 @@ class LoopFit(Fit):
 
     late_s = LATE_S
     forecasts: Forecasts | None = None
-    likeliest: tuple[float, Array, list[tuple[Array, Array]]]
 
     def __init__(self, model: SerialModel, trials: Trials) -> None:
         self.loops = [ClosedLoop.of(s) for s in trials.runs]
@@ -124,7 +123,8 @@ class LoopFit(Fit):
     def step(self) -> float:
         """Fit around the current values and motion, and move both; return the largest step in standard errors.
 
-        Once the noise is held, a step that makes the positions less likely than before is halved.
+        Rests and drives at their limits come and go as the motion moves, which full steps would do for ever. So steps
+        shrink in the end (H. Robbins and S. Monro, "A stochastic approximation method", 1951).
         """
         begun = self.x, [(loop.q, loop.dq) for loop in self.loops]
         moved = super().step()
@@ -138,21 +138,16 @@ class LoopFit(Fit):
         every = [
             (loop, filtered, own) for (loop, filtered), own in zip(self.options.loops, lacking, strict=True)
         ]
-        likelihood = sum(filtered.log_density(own, loop.off) for loop, filtered, own in every)
-        if self.steps > LEARNING + 1 and likelihood < self.likeliest[0] - LEAST_DROP:
-            _, x, motions = self.likeliest
-            moved = float(np.max(np.abs(begun[0] - x) / np.sqrt(np.diag(self.covariance)))) / 2.0
-            self.x = 0.5 * (begun[0] + x)
-            for loop, *pairs in zip(self.loops, begun[1], motions, strict=True):
-                loop.q, loop.dq = (0.5 * (p + q) for p, q in zip(*pairs, strict=True))
-            self.jump(self.x)
-            return moved
-        self.likeliest = likelihood, *begun
         for loop, filtered, own in every:
             loop.move(filtered, own)
             if self.steps <= LEARNING:
                 loop.learn(filtered, own)
-        return moved if self.steps > LEARNING else np.inf
+        share = 1.0 / (1 + max(self.steps - FULL, 0))
+        self.x = begun[0] + share * (self.x - begun[0])
+        for loop, (q, dq) in zip(self.loops, begun[1], strict=True):
+            loop.q, loop.dq = q + share * (loop.q - q), dq + share * (loop.dq - dq)
+        self.jump(self.x)
+        return share * moved if self.steps > LEARNING else np.inf
 
     def widen(self) -> None:
         """Widen standard errors by the scatter between parts, by quantity (R. T. Birge, Phys. Rev. 40, 1932).
