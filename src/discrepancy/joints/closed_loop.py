@@ -51,6 +51,7 @@ BANDS = np.array([0.0, 0.02, 0.04, 0.08, 0.15, 0.25, 0.35, 0.5])
 """Edges of the bands of the innovations over the log's rate."""
 CHUNK = 64
 """Columns that are filtered at once."""
+Motion = tuple[Array, Array, Array]
 
 
 def commanded(log: JointLog) -> bool:
@@ -123,19 +124,20 @@ class ClosedLoop:
         return self.signals.log.period_s / self.every
 
     @property
-    def middle(self) -> tuple[Array, Array, Array]:
+    def middle(self) -> Motion:
         """Positions, velocities and accelerations at the middles of the steps, shape (N, J) each."""
         h = self.step_s
         return 0.5 * (self.q[1:] + self.q[:-1]), np.diff(self.q, axis=0) / h, np.diff(self.dq, axis=0) / h
 
-    def seen(self, model: SerialModel, late: Array) -> Signals:
-        """The motion and the torque that the loop asks for, at the middles of the steps.
+    def seen(self, model: SerialModel, late: Array, motion: Motion | None = None) -> Signals:
+        """A motion and the torque that the loop asks for in it, at the middles of the steps.
 
         Args:
             model: the robot as described.
             late: delay of the commands, shape (J,) [s].
+            motion: positions, velocities and accelerations there, shape (N, J) each; None: the estimated motion.
         """
-        q, dq, ddq = self.middle
+        q, dq, ddq = motion or self.middle
         log, h = self.signals.log, self.step_s
         time = log.time[self.first] + (np.arange(len(q)) + 0.5) * h
         (command, added), (before, _), (after, _) = (
@@ -248,6 +250,21 @@ class ClosedLoop:
     def off(self) -> Array:
         """Measured positions minus the motion, 0 where there is none, shape (M, J)."""
         return np.nan_to_num(self.measured - self.q[:: self.every])
+
+    def predicted(self, filtered: Filtered, lacking: Array) -> Motion:
+        """The motion as readings up to each step tell it, as ``middle``.
+
+        Columns of this motion do not depend on the noise of later readings. In those of the smoothed motion, that noise
+        would go with the innovations and make delays too large and inertias too small.
+
+        Args:
+            filtered: filter around the present motion.
+            lacking: torque that the model lacks there, shape (N, J).
+        """
+        begin, end = filtered.predicted(lacking, self.off)
+        (q, dq, ddq), J, h = self.middle, self.q.shape[1], self.step_s
+        middle, rate = 0.5 * (begin + end), (end - begin) / h
+        return q + middle[:, :J], dq + rate[:, :J], ddq + rate[:, J:]
 
     def learn(self, filtered: Filtered, lacking: Array) -> None:
         """Maximise the likelihood of each joint by the variances of reading, jitter and unexplained torque.

@@ -77,6 +77,20 @@ class Filtered:
         _filter((loop.A, loop.B), (self.gain, self.root), loop.every, np.ascontiguousarray(torque), y, out)
         return out
 
+    def predicted(self, torque: Array, position: Array) -> Array:
+        """Likeliest deviations at the begin and the end of each step given the measurements so far, shape (2, N, 2J).
+
+        Args:
+            torque: input torques, shape (N, J).
+            position: measurements, shape (M, J).
+        """
+        loop = self.loop
+        out = np.empty((2, *loop.A.shape[:2]))
+        _predict(
+            (loop.A, loop.B), self.gain, loop.every, np.ascontiguousarray(torque), np.ascontiguousarray(position), out
+        )
+        return out
+
     def smoothed(self, torque: Array, position: Array) -> Array:
         """Likeliest deviations at all grid points given the inputs and the measurements, shape (N + 1, 2J).
 
@@ -134,6 +148,20 @@ def _filter(steps, gains, every, torque, position, out):
             x = x + np.dot(gain[k], e)
         if n < N:
             x = np.dot(A[n], x) + np.dot(B[n], torque[n])
+
+
+@compiled
+def _predict(steps, gain, every, torque, position, out):
+    A, B = steps
+    N, twice, J = B.shape
+    x = np.zeros(twice)
+    for n in range(N):
+        if n % every == 0:
+            k = n // every
+            x = x + np.dot(gain[k], position[k] - x[:J])
+        out[0, n] = x
+        x = np.dot(A[n], x) + np.dot(B[n], torque[n])
+        out[1, n] = x
 
 
 @compiled

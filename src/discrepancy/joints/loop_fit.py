@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from discrepancy.joints.closed_loop import ClosedLoop
+from discrepancy.joints.closed_loop import ClosedLoop, cells_of
 from discrepancy.joints.fit import DETERMINED, FREE_GAIN, GAIN, LEARNING, Fit, HeldOut, Parameter, Scalar
 from discrepancy.joints.forecast import Forecasts, errors, machine
 from discrepancy.joints.friction import AT_REVERSALS, deviations, polynomial
@@ -103,7 +103,7 @@ class LoopFit(Fit):
         return min(float(loop.damping[j]) for loop in self.loops)
 
     def linear(self) -> JointProblem:
-        """Build the problem around the present motion."""
+        """Build the problem around the present motion, with rows of the motion that the filter predicts in the end."""
         late, scale = (self.each(what) for what in ("delay_s", "scale"))
         for loop in self.loops:
             loop.limit = loop.plain[:, 3] * (1.0 + self.each("limit"))
@@ -118,7 +118,20 @@ class LoopFit(Fit):
             share = len(runs[k].time) / len(self.trials.runs[k].time)
             parts.append((k, slice(round(at.start * share), round(at.stop * share))))
         self.trials = replace(self.trials, runs=runs, parts=tuple(parts))
-        return super().linear()
+        problem = super().linear()
+        residual = problem.shifted(problem.residual, self.values, -1.0)
+        if self.steps < LEARNING:  # the filter's predictions are far off
+            problem.cells = cells_of(pairs, problem.residual, problem.series)
+            return problem
+        predicted = [
+            loop.seen(self.model, late, loop.predicted(filtered, own))
+            for (loop, filtered), own in zip(pairs, residual, strict=True)
+        ]
+        self.trials = replace(self.trials, runs=tuple(predicted))
+        columns = super().linear()
+        self.trials = replace(self.trials, runs=runs)
+        problem.cells = cells_of(pairs, columns.shifted(residual, self.values), columns.series)
+        return problem
 
     def step(self) -> float:
         """Fit around the current values and motion, and move both; return the largest step in standard errors.
@@ -130,11 +143,8 @@ class LoopFit(Fit):
         moved = super().step()
         parts = range(len(self.normals))
         self.friction = self.deviating(parts)
-        lacking = [own.copy() for own in self.problem.residual]
-        for i, value in self.explained(parts)[1]:
-            for j, series in self.problem.series[i].items():
-                for own, column in zip(lacking, series, strict=True):
-                    own[:, j] -= value * column
+        found = {self.problem.labels[i]: value for i, value in self.explained(parts)[1]}
+        lacking = self.problem.shifted(self.problem.residual, found, -1.0)
         every = [
             (loop, filtered, own) for (loop, filtered), own in zip(self.options.loops, lacking, strict=True)
         ]

@@ -15,7 +15,7 @@ from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
 from discrepancy.joints import backlash, friction
 from discrepancy.joints.causes import CAUSES, JointSignals, Span
-from discrepancy.joints.closed_loop import ClosedLoop, bands_of, cells_of
+from discrepancy.joints.closed_loop import ClosedLoop, bands_of
 from discrepancy.joints.loop_filter import Filtered
 from discrepancy.joints.mechanics import (
     Tree,
@@ -53,7 +53,8 @@ class Given:
         kept: weight of each sample, shape (W, J) for each log; empty: all samples count.
         inertias: whether every link has a column for each of its ten inertial parameters.
         mount: gravity of another mount of the base than the model's [m/s^2], shape (3,); None: the model's.
-        loops: closed position loop and its filter for each log, if rows are positions; empty: rows are torques.
+        loops: closed position loop and its filter for each log, if rows are positions, which ``cells_of`` then makes;
+            empty: rows are torques.
         wanted: labels of the columns that have rows, beside deviations of friction's law; empty: all.
     """
 
@@ -193,6 +194,16 @@ class JointProblem(Pushes):
                 S[columns], (unit * max(self.dry[j], 0.1 * self.joints[j][0].span.torque)) ** 2
             )
         return S
+
+    def shifted(self, residual: Sequence[Array], values: Values, share: float = 1.0) -> list[Array]:
+        """Residuals plus a share of what the columns make of ``values``, one array (W, J) for each log."""
+        out = [own.copy() for own in residual]
+        for label, series in zip(self.labels, self.series, strict=True):
+            if value := share * values.get(label, 0.0):
+                for c, x in series.items():
+                    for own, column in zip(out, x, strict=True):
+                        own[:, c] += value * column
+        return out
 
     def _swaying(self, group: Group, compliance: float) -> list[Series]:
         """Free vibrations of an elastic joint at the start of each log, scaled by its deflection under load."""
@@ -425,18 +436,10 @@ class _Builder:
         )  # a sticking gear looks like a push
         for s in () if none else self.parts:
             out.pushed.append(force_torque(s.motion, body, self.tree.com[body]))
-        for i, label in enumerate(
-            out.labels
-        ):  # residual relative to the model, not to the linearisation point
-            if self.values.get(label):
-                for c, x in out.series[i].items():
-                    for t, own in enumerate(x):
-                        self.residual[t][:, c] += self.values[label] * own
+        self.residual = out.shifted(self.residual, self.values)  # relative to the model, not the linearisation point
         if self.more.changed is not None:
             self._apart(self.more.changed)
-        if self.more.loops:
-            out.cells = cells_of(self.more.loops, self.residual, out.series if self.more.wanted else [])
-        else:
+        if not self.more.loops:
             out.cells = self._cells(self.residual)
             out.cells.add(out.rows(out.series))
         out.residual = self.residual
@@ -516,7 +519,8 @@ class _Builder:
                     cause.name, n, index, cause.slab(self.spans[j], shape), log_prior=-math.log(len(shapes)),
                     shape=tuple(shape.items()), least=least if cause.positive else (),
                 )  # fmt: skip
-        for number, (signal, terms) in enumerate(functions(self.joints[j], self.joints[j - 1])):
+        unlisted = () if self.more.wanted else functions(self.joints[j], self.joints[j - 1])
+        for number, (signal, terms) in enumerate(unlisted):
             if signal == "neighbour's torque" and not j:
                 continue
             # Gravity deflects an elastic joint by a function of its position, as a reading error does.
