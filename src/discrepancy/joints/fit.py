@@ -496,7 +496,9 @@ class Fit:
             table = s.name.split("_", 1)[0]
             if s.label.endswith((" coulomb_Nm", " viscous_Nms_per_rad", " armature_kgm2")):
                 tables[table][self.model.joints.index(s.place)] += value
-            elif s.name in ("gain", "delay_s", "limit", "zero_rad") or s.name.startswith(("position", "tilt")):
+            elif s.name in ("gain", "delay_s", "limit", "zero_rad") or s.name.startswith(
+                ("position", "tilt")
+            ):
                 self.values[s.label] = float(value)
         self.tree = replace(self.given, mass=mass, com=com, inertia=inertia, **tables)
 

@@ -87,7 +87,12 @@ class Filtered:
         loop = self.loop
         out = np.empty((2, *loop.A.shape[:2]))
         _predict(
-            (loop.A, loop.B), self.gain, loop.every, np.ascontiguousarray(torque), np.ascontiguousarray(position), out
+            (loop.A, loop.B),
+            self.gain,
+            loop.every,
+            np.ascontiguousarray(torque),
+            np.ascontiguousarray(position),
+            out,
         )
         return out
 

@@ -203,7 +203,7 @@ class LoopFit(Fit):
         return Parameter(s.place, name, gain, gain / (1.0 + value), se, prior, known, in_model=False)
 
     def scalar_slopes(self) -> Array:
-        """Derivatives of the scalars as they are told by their deviations: an error of a gain divides gain and limit."""
+        """As for torques; an error of a gain divides gain and limit."""
         out, at = super().scalar_slopes(), {s.label: i for i, s in enumerate(self.scalars)}
         for s in self.scalars:
             if s.name not in ("gain", "limit"):

@@ -436,7 +436,9 @@ class _Builder:
         )  # a sticking gear looks like a push
         for s in () if none else self.parts:
             out.pushed.append(force_torque(s.motion, body, self.tree.com[body]))
-        self.residual = out.shifted(self.residual, self.values)  # relative to the model, not the linearisation point
+        self.residual = out.shifted(
+            self.residual, self.values
+        )  # relative to the model, not the linearisation point
         if self.more.changed is not None:
             self._apart(self.more.changed)
         if not self.more.loops:

@@ -248,7 +248,7 @@ def calibrate(
 
 
 def _found_map(found: ArmCalibration, logs: GivenLogs, given: Path | str | None) -> str:
-    """Text of the first log's map with the delays and roughly known gains that were found; empty without a file."""
+    """Text of the first log's map with the delays, limits and roughly known gains that were found; empty without one."""
     from mocobot.api.joints import map_path
 
     first = logs if isinstance(logs, Path | str | JointLog) else next(iter(logs))
@@ -264,6 +264,11 @@ def _found_map(found: ArmCalibration, logs: GivenLogs, given: Path | str | None)
     gains = {place: x for (place, name), x in values.items() if name.startswith("position_gain_")}
     if len(gains) == len(found.joints):
         numbers["position_gain"] = gains
+    if found.servos is not None and any(name.startswith("limit_") for _, name in values):
+        scale = [1.0 + values.get((place, "gain"), 0.0) for place in found.model.joints]
+        most = dict(zip(found.model.joints, found.servos[:, 3] * scale, strict=True))
+        if np.isfinite([*most.values()]).all():
+            numbers["limit"] = most
     return with_control(path.read_text(encoding="utf-8"), numbers) or ""
 
 

@@ -186,7 +186,7 @@ def test_torques_told_beside_the_commands(commands, tmp_path):
     values = {(p.place, p.name): p for p in found.parameters}
     for key, true in TWO.truth().items():
         assert abs(values[key].value - true) < max(4.0 * values[key].se, 0.02 * true)
-    assert all((part.calibrated < 2.0 * NOISE).all() for part in found.held_out)
+    assert all((part.calibrated < 2.2 * NOISE).all() for part in found.held_out)
 
 
 def test_positions_that_are_read_late_at_random(commands, tmp_path):
