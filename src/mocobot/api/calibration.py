@@ -248,7 +248,7 @@ def calibrate(
 
 
 def _found_map(found: ArmCalibration, logs: GivenLogs, given: Path | str | None) -> str:
-    """Text of the first log's map with the delays, limits and roughly known gains that were found; empty without one."""
+    """Text of the first log's map with the delays, limits and roughly known gains found; empty without a file."""
     from mocobot.api.joints import map_path
 
     first = logs if isinstance(logs, Path | str | JointLog) else next(iter(logs))
