@@ -22,7 +22,6 @@ import mocobot
 
 JOINTS = ("hip", "thigh", "calf")
 REAR = {"hip": 0.0, "thigh": 1.2, "calf": -2.4}
-NAMES = ("armature_kgm2", "coulomb_Nm", "viscous_Nms_per_rad", "command_delay_s")
 MAP = """version = 1
 joints = [JOINTS]
 time = { column = "time_s", unit = "s" }
@@ -46,22 +45,12 @@ def main(folder: tyro.conf.Positional[Path]) -> None:
         path = Path(name) / "log.toml"
         path.write_text(MAP.replace("JOINTS", ", ".join(f'"{n}"' for n in logged)), encoding="utf-8")
         begun = time.process_time()
-        calibration = mocobot.calibrate(folder / "front_legs.csv", folder / "go2.xml", map=path, lock=lock)
+        calibration = mocobot.calibrate(
+            folder / "front_legs.csv", folder / "go2.xml", map=path, lock=lock, same=("FL=FR",)
+        )
     found = calibration.found
-    values = {(p.place, p.name): p for p in found.parameters}
-    print(
-        f"{time.process_time() - begun:.1f} s of CPU\n{'':<32}{'left':>20}{'right':>20}{'apart [s.e.]':>14}"
-    )
-    for quantity in NAMES:
-        for joint in JOINTS:
-            left, right = (values[f"{side}_{joint}_joint", quantity] for side in ("FL", "FR"))
-            apart = (left.value - right.value) / np.hypot(left.se, right.se)
-            cells = "".join(
-                f"{f'{p.value:.4f} +- {p.se:.4f}' + ('' if p.determined else ' ?'):>20}"
-                for p in (left, right)
-            )
-            print(f"{f'{quantity} of {joint}':<32}{cells}{apart:>14.1f}")
-    print("? the logs do not determine it\n")
+    print(f"{time.process_time() - begun:.1f} s of CPU\n")
+    print("\n".join([*found.same[0].lines(), ""]))
     for title, which in (
         ("motion", "torque"),
         ("given model", "model"),

@@ -117,6 +117,8 @@ class CalibrateOptions(PartOptions):
     """Weighed payloads: c=10.48+-0.005; standard error 0.1 % if not given. One fixes the springs' common scale."""
     parallel_flanges: Flag = False
     """Assume that the z axes of all flanges are parallel; this fixes the zeros of theta_x and the drawing frames."""
+    same: Annotated[AnyWords, tyro.conf.arg(metavar="LEFT=RIGHT...")] = ()
+    """Compare joints of two machines of one kind, with --model: FL=FR for FL_hip_joint with FR_hip_joint, and so on."""
     tilt: Flag = False
     """Estimate the tilt of each base (standard deviation 0.2 deg unless the prior states one)."""
     arm_masses: Flag = False
@@ -125,6 +127,8 @@ class CalibrateOptions(PartOptions):
     def check_for(self, model: object, free: object) -> None:
         """Raise InputError for an option that does not apply to a team, or to a single robot."""
         self.check_part(model)
+        if model is None and self.same:
+            raise InputError("same compares joints of a single robot; it needs a model")
         if model is not None:
             refuse_teams(self)
             if free:

@@ -19,6 +19,8 @@ forecasts           of positions only: {part, time_s, joints: {joint: {command, 
                     second; response {frequency_Hz, measured, model, calibrated}: amplitude of the position over that
                     of the command
 validated           false if the only part was predicted from itself
+same                list of {names, sentence, differences}: two machines of one kind; differences are lists of
+                    {places, parameter, values, se}, with the standard error of the difference
 notes               sentences
 """
 
@@ -58,7 +60,7 @@ from mocobot_sim.serial.mjcf import keep_inertials, real_inertia, servo, set_ine
 FORMAT, VERSION = "mocobot-joint-calibration", 1
 MODEL, TABLE, NAME, REPORT = "as_found.xml", "parameters.csv", "calibration.json", "report.txt"
 KEYS = "format", "version", "model", "logs", "parameters", "combinations", "held_out", "validated", "notes"
-OPTIONAL = "provenance", "predicts", "forecasts"
+OPTIONAL = "provenance", "predicts", "forecasts", "same"
 PARAMETER = ("place", "parameter", "model", "value", "se", "prior_se", "determined", "in_model")
 HELD_OUT = ("model", "least_squares", "calibrated", "noise", "torque")
 QUANTITY = {"parameter": (
@@ -103,6 +105,13 @@ def to_dict(found: ArmCalibration) -> dict[str, Any]:
             for j in found.joints
         },
         **({} if found.forecasts is None else {"forecasts": _forecasts(found, found.forecasts)}),
+        **({} if not found.same else {"same": [
+            {"names": list(one.names), "sentence": one.sentence, "differences": [
+                {"places": list(d.places), "parameter": d.name, "values": list(d.values), "se": d.se}
+                for d in one.differences
+            ]}
+            for one in found.same
+        ]}),
         "validated": found.validated,
         "notes": list(found.notes),
     }  # fmt: skip
@@ -187,6 +196,8 @@ def _lines(found: ArmCalibration) -> Iterator[str]:
             yield from _row(_formula(c), c.model, c.value, c.se, width)
         if len(found.combinations) > MOST_COMBINATIONS:
             yield f"  {len(found.combinations) - MOST_COMBINATIONS} more are in {NAME}."
+    for comparison in found.same:
+        yield from ("", *comparison.lines())
     unknown = [p for p in found.parameters if not p.determined]
     if unknown:
         yield ""

@@ -18,6 +18,7 @@ from discrepancy.joints.forecast import Forecasts
 from discrepancy.joints.loop_fit import LoopFit, with_gains
 from discrepancy.joints.mechanics import Tree
 from discrepancy.joints.model import SerialModel
+from discrepancy.joints.same_kind import Comparison, compared, machines
 from discrepancy.joints.trials import at_limits, notes_of, resting, trials_of
 from estimator.arrays import Array
 from estimator.errors import InputError
@@ -54,6 +55,7 @@ class ArmCalibration:
         forecasts: of the first part; None unless positions are predicted.
         friction: of joints whose friction deviates from its law, where positions are predicted: Coulomb friction and
             damping of first to third degree in the speed, shape (4,).
+        same: comparisons of machines of one kind.
     """
 
     model: SerialModel
@@ -74,10 +76,14 @@ class ArmCalibration:
     servos: Array | None = None
     forecasts: Forecasts | None = None
     friction: Mapping[int, Array] = field(default_factory=dict)
+    same: tuple[Comparison, ...] = ()
 
 
 def calibrate_arm(
-    model: SerialModel, logs: Sequence[JointLog], say: Callable[[str], object] = lambda _: None
+    model: SerialModel,
+    logs: Sequence[JointLog],
+    say: Callable[[str], object] = lambda _: None,
+    same: Sequence[str] = (),
 ) -> ArmCalibration:
     """Fit all parameters of a robot to logs of its joints.
 
@@ -85,10 +91,12 @@ def calibrate_arm(
         model: the robot as described.
         logs: joint logs with torques, currents or duties.
         say: receives a line of text about each step.
+        same: LEFT=RIGHT for machines of one kind to compare, see ``same_kind.machines``.
 
     Raises:
-        InputError: a log cannot be used.
+        InputError: a log cannot be used, or ``same`` names no two joints.
     """
+    alike = [machines(model.joints, one) for one in same]
     say("smoothing the logs")
     logs = with_gains(model, logs)
     positions = all(map(commanded, logs))
@@ -116,9 +124,11 @@ def calibrate_arm(
     names = tuple(dict.fromkeys(log.name for log in logs))
     notes = [*model.notes, *notes_of(logs), *at_limits(model, trials.limited), *resting(logs)]
     notes = [*unsettled, *notes, *fit.notes()]
+    parameters, covariance = tuple(fit.parameters()), fit.covariances()
     return ArmCalibration(
-        model, tuple(map(int, trials.joints)), tuple(fit.parameters()), tuple(fit.combinations()),
+        model, tuple(map(int, trials.joints)), parameters, tuple(fit.combinations()),
         fit.tree, fit.zero(), fit.gravity(), fit.links, fit.coupled(), held,
-        len(trials.parts) > 1, names, tuple(notes), "position" if positions else "torque", fit.covariances(),
+        len(trials.parts) > 1, names, tuple(notes), "position" if positions else "torque", covariance,
         fit.servos(), fit.forecasts if isinstance(fit, LoopFit) else None, fit.friction,
+        tuple(compared(parameters, covariance, one) for one in alike),
     )  # fmt: skip

@@ -223,7 +223,7 @@ def calibrate(
         say("reading")
         read_from = read_logs(logs, robot, map=chosen.map, episode=chosen.episode)
         drives = tuple(log.drive for log in read_from if log.by_command)
-        found = calibrate_arm(robot, read_from, say)
+        found = calibrate_arm(robot, read_from, say, chosen.same)
         if found.predicts == "torque":
             return JointCalibration(found, drives if len(drives) == len(read_from) else ())
         return JointCalibration(found, drives, _found_map(found, logs, chosen.map))
