@@ -37,6 +37,7 @@ class Arm:
         reach: largest motion about ``rest`` [rad or m].
         rest: middle of the motion [rad or m].
         late_s: from the stamp of a command until the loop follows it [s].
+        most: largest torque of the drives [N m or N]; 0: they have no limit.
     """
 
     xml: str = ARM
@@ -48,6 +49,7 @@ class Arm:
     reach: tuple[float, ...] = (0.6, 0.7)
     rest: tuple[float, ...] = (0.4, -0.5)
     late_s: float = 0.006
+    most: tuple[float, ...] = (0.0, 0.0)
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -95,10 +97,12 @@ class Arm:
             added: torques told beside the commands, shape (n, J).
         """
         spec = self.spec()
-        for name, kp, kd in zip(self.joints, self.kp, self.kd, strict=True):
+        for name, kp, kd, most in zip(self.joints, self.kp, self.kd, self.most, strict=True):
             actuator = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
             actuator.biastype = mujoco.mjtBias.mjBIAS_AFFINE
             actuator.gainprm[0], actuator.biasprm[:3] = kp, [0.0, -kp, -kd]
+            if most:
+                actuator.forcelimited, actuator.forcerange = True, [-most, most]
         spec.option.timestep, spec.option.integrator = STEP_S, mujoco.mjtIntegrator.mjINT_RK4
         model = spec.compile()
         data, told = mujoco.MjData(model), commands if added is None else commands + added / np.array(self.kp)

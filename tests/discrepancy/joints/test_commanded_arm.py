@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -187,6 +188,28 @@ def test_torques_told_beside_the_commands(commands, tmp_path):
     for key, true in TWO.truth().items():
         assert abs(values[key].value - true) < max(4.0 * values[key].se, 0.02 * true)
     assert all((part.calibrated < 2.2 * NOISE).all() for part in found.held_out)
+
+
+def test_the_largest_torque_of_drives_that_reach_it(commands, tmp_path):
+    """The map has limits off by a tenth; the shoulder reaches its own, the elbow never."""
+    arm = replace(TWO, most=(5.0, 60.0))
+    q = noisy(arm.positions(STAMPS, commands))
+    text = arm.map("limit = [5.5, 54.0]\n")
+    (tmp_path / "arm.xml").write_text(arm.spec(WRONG).to_xml(), encoding="utf-8")
+    log = arm.write(tmp_path, text, t=STAMPS, q=q, command=commands)
+    done = mocobot.calibrate(log, tmp_path / "arm.xml")
+    assert_honest(done.found, arm)
+    limits = {p.place: p for p in done.found.parameters if p.name == "limit_Nm"}
+    assert set(limits) == {"shoulder"}
+    assert abs(limits["shoulder"].value - 5.0) < 4.0 * limits["shoulder"].se < 0.2
+    assert all((part.calibrated < 3.0 * NOISE).all() for part in done.found.held_out)
+    done.write(tmp_path / "out")
+    told = json.loads((tmp_path / "out/actuators.json").read_text())["joints"]["shoulder"]["effort_limit"]
+    assert told["source"] == "logs"
+    assert told["mean"] == limits["shoulder"].value
+    gain = next(p.value for p in done.found.parameters if (p.place, p.name) == ("shoulder", "gain"))
+    found_map = tomllib.loads((tmp_path / "out/log.toml").read_text())["control"]["limit"]
+    assert found_map[0] == pytest.approx(told["mean"] * (1.0 + gain), rel=1e-6)
 
 
 def test_positions_that_are_read_late_at_random(commands, tmp_path):
