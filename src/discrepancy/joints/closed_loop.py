@@ -12,7 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.fft import dct
+from numpy.typing import NDArray
+from scipy.fft import dct, prev_fast_len
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize
 
@@ -93,6 +94,7 @@ class ClosedLoop:
         """Begin with the low-passed positions."""
         log = s.log
         first, last = (int(np.argmin(np.abs(log.time - t))) for t in (s.time[0], s.time[-1]))
+        last = first + prev_fast_len(last + 1 - first, real=True) - 1  # drops few samples
         every = int(np.ceil(log.period_s / STEP_S - 1e-9))
         here = slice(first, last + 1)
         way = CubicSpline(log.time, low_pass(log.q, log.rate_hz, min(MOTION_HZ, SHARE * log.rate_hz)), axis=0)
@@ -428,21 +430,26 @@ def cells_of(
     white = [
         f.innovations(r[:, :, None], loop.off)[:, :, 0] for (loop, f), r in zip(loops, residual, strict=True)
     ]
-    cells = Cells.of(bands, white)
-    rows = []
-    for t, ((_, f), r) in enumerate(zip(loops, residual, strict=True)):
-        own = np.zeros((bands.lengths[t], r.shape[1], len(series)))
-        for first in range(0, len(series), CHUNK):
-            some = [p for p in range(first, min(first + CHUNK, len(series))) if series[p]]
+    cells, kept = Cells.of(bands, white), [k for k, own in enumerate(series) if own]
+    found: list[list[tuple[NDArray[np.intp], Array]]] = [[] for _ in cells.channels]
+    for first in range(0, len(kept), CHUNK):
+        some, spectra = np.array(kept[first : first + CHUNK]), []
+        for t, ((_, f), r) in enumerate(zip(loops, residual, strict=True)):
             torque = np.zeros((*r.shape, len(some)))
             for k, p in enumerate(some):
                 for j, x in series[p].items():
                     torque[:, j, k] = x[t]
-            own[:, :, some] = f.innovations(torque)
-        rows.append(dct(bands.faded(own, t), axis=0, norm="ortho")[: len(bands.of_trial(t))])
-    kept = [k for k, own in enumerate(series) if own]
-    X = np.concatenate(rows)[cells.order][:, :, kept]
-    for c, channel in enumerate(cells.channels):
-        cells.append(channel, kept, X[:, c])
+            # Each series is contiguous: the transforms take most of the time.
+            faded = bands.faded(f.innovations(torque), t).T
+            spectra.append(dct(faded, norm="ortho")[:, :, : len(bands.of_trial(t))])
+        rows = np.concatenate(spectra, axis=2)[:, :, cells.order]
+        for c, own in enumerate(found):
+            seen = rows[:, c].any(axis=1)  # two legs do not act on each other
+            own.append((some[seen], rows[seen, c]))
+    for channel, own in zip(cells.channels, found, strict=True):
+        if own:
+            indices, columns = (np.concatenate(x) for x in zip(*own, strict=True))
+            cells.append(channel, indices.tolist(), columns.T)
+        own.clear()
     cells.count = len(series)
     return cells

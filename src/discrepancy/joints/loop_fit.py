@@ -119,6 +119,8 @@ class LoopFit(Fit):
             parts.append((k, slice(round(at.start * share), round(at.stop * share))))
         self.trials = replace(self.trials, runs=runs, parts=tuple(parts))
         problem = super().linear()
+        if not self.options.wanted:  # it only tells which parameters there are
+            return problem
         residual = problem.shifted(problem.residual, self.values, -1.0)
         if self.steps < LEARNING:  # the filter's predictions are far off
             problem.cells = cells_of(pairs, problem.residual, problem.series)
