@@ -36,7 +36,15 @@ def test_the_folder_holds_model_table_numbers_and_report(tmp_path, capsys, log):
     assert model.dof_frictionloss == pytest.approx([1.5, 2.0, 1.0], rel=0.1)
     stated = json.loads((tmp_path / "found" / "calibration.json").read_text())
     assert [file["name"] for file in stated["provenance"]["files"]] == ["arm.xml", "log.toml", "log.csv"]
-    assert set(stated["provenance"]["options"]) == {"model", "map", "episode", "lock", "base", "max_unpacked"}
+    assert set(stated["provenance"]["options"]) == {
+        "model",
+        "map",
+        "episode",
+        "lock",
+        "base",
+        "max_unpacked",
+        "same",
+    }
 
 
 def test_a_model_as_found_is_a_model_for_the_next_command(tmp_path, capsys, log):

@@ -94,7 +94,7 @@ class ClosedLoop:
         """Begin with the low-passed positions."""
         log = s.log
         first, last = (int(np.argmin(np.abs(log.time - t))) for t in (s.time[0], s.time[-1]))
-        last = first + prev_fast_len(last + 1 - first, real=True) - 1  # drops few samples
+        last = first + (prev_fast_len(last + 1 - first, real=True) or 1) - 1  # drops few samples
         every = int(np.ceil(log.period_s / STEP_S - 1e-9))
         here = slice(first, last + 1)
         way = CubicSpline(log.time, low_pass(log.q, log.rate_hz, min(MOTION_HZ, SHARE * log.rate_hz)), axis=0)
@@ -441,7 +441,7 @@ def cells_of(
                     torque[:, j, k] = x[t]
             # Each series is contiguous: the transforms take most of the time.
             faded = bands.faded(f.innovations(torque), t).T
-            spectra.append(dct(faded, norm="ortho")[:, :, : len(bands.of_trial(t))])
+            spectra.append(np.asarray(dct(faded, norm="ortho"))[:, :, : len(bands.of_trial(t))])
         rows = np.concatenate(spectra, axis=2)[:, :, cells.order]
         for c, own in enumerate(found):
             seen = rows[:, c].any(axis=1)  # two legs do not act on each other
