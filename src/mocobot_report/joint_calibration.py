@@ -4,8 +4,11 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from markupsafe import Markup
 
 from discrepancy.joints import calibrated
+from discrepancy.joints.quantities import described
+from discrepancy.joints.same_kind import Comparison
 from estimator.statistics import rms
 from mocobot_report.charts import Chart, Key, Line, Panel, dots, line, log_axis, row_layout, stacked_chart
 from mocobot_report.numbers import counted, percent, plain, spelled
@@ -51,9 +54,25 @@ def context(result: "Result", say: Callable[[str], object]) -> dict[str, Any]:
         "findings": calibrated.findings(told.found), "tiles": tiles, "left": _chart(told),
         "forecasts": [_forecast(told, j) for j in told.joints] if told.forecasts else [],
         "names": [told.model.joints[j] for j in told.joints],
+        "same": [(one.sentence, _differences(one)) for one in told.same],
         "tables": [table(name, head, own, note=notes.get(name, ""), stack=True) for name, own in rows.items()],
         "pictures": [],
     }  # fmt: skip
+
+
+def _differences(one: Comparison) -> Markup | None:
+    """Table of what two machines of one kind have."""
+    rows: list[list[Entry]] = []
+    for d in one.differences:
+        words, unit, scale = described(d.name)
+        off = scale * (d.values[0] - d.values[1])
+        cells = [value(scale * x, 4) for x in d.values]
+        rows.append([f"{words} of {d.places[0]}", spelled(unit), *cells, measurement(off, scale * d.se)])
+    return (
+        table("Machines of one kind", ("", "unit", *one.names, "difference"), rows, stack=True)
+        if rows
+        else None
+    )
 
 
 def keys_of(told: calibrated.Told) -> list[Key]:

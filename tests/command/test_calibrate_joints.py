@@ -11,6 +11,7 @@ import pytest
 
 import mocobot
 from command import refused, run
+from discrepancy.joints.calibrated import from_dict
 from made_arm import made, write_log
 
 
@@ -68,6 +69,40 @@ def test_a_model_as_found_is_a_model_for_the_next_command(tmp_path, capsys, log)
 def test_options_of_a_team_are_refused(tmp_path, capsys, log, options):
     said = refused(capsys, "calibrate", log, "--model", tmp_path / "arm.xml", *options)
     assert f"{options[0]} is of a team's robots" in said
+
+
+def test_machines_of_one_kind_are_compared(tmp_path, capsys, log):
+    """Elbow and shoulder stand for two legs; they have unlike friction."""
+    same = ("--same", "elbow=shoulder")
+    code, out, _ = run(
+        capsys, "calibrate", log, "--model", tmp_path / "arm.xml", "--out", tmp_path / "found", *same
+    )
+    assert code == 0
+    assert "elbow and shoulder differ by more than their errors in" in " ".join(out.split())
+    told = json.loads((tmp_path / "found/calibration.json").read_text())["same"][0]
+    own = {d["parameter"]: d["values"] for d in told["differences"]}
+    assert own["coulomb_Nm"] == pytest.approx([1.0, 2.0], rel=0.1)
+    assert told["probability"] < 0.01
+    again = from_dict(json.loads((tmp_path / "found/calibration.json").read_text()), "").same[0]
+    assert again.sentence in " ".join(out.split())
+    assert run(capsys, "report", tmp_path / "found")[0] == 0
+    assert again.sentence[:-1] in " ".join((tmp_path / "found/report.html").read_text().split())
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (
+            ("--model", "arm.xml", "--same", "FL=FR"),
+            "no joint with 'FL' in its name has one with 'FR' instead",
+        ),
+        (("--model", "arm.xml", "--same", "elbow"), "it must be LEFT=RIGHT, such as FL=FR"),
+        (("--same", "elbow=shoulder"), "same compares joints of a single robot; it needs a model"),
+    ],
+)
+def test_other_machines_are_refused(tmp_path, capsys, log, monkeypatch, options, said):
+    monkeypatch.chdir(tmp_path)
+    assert said in refused(capsys, "calibrate", log, *options)
 
 
 def test_a_model_without_logs_is_refused(capsys, tmp_path, log):

@@ -19,8 +19,8 @@ forecasts           of positions only: {part, time_s, joints: {joint: {command, 
                     second; response {frequency_Hz, measured, model, calibrated}: amplitude of the position over that
                     of the command
 validated           false if the only part was predicted from itself
-same                list of {names, sentence, differences}: two machines of one kind; differences are lists of
-                    {places, parameter, values, se}, with the standard error of the difference
+same                list of {names, probability, differences}: two machines of one kind, the probability that equal ones
+                    differ as much, and a list of {places, parameter, values, se}: se is that of the difference
 notes               sentences
 """
 
@@ -46,6 +46,7 @@ from discrepancy.joints.effects import numbered
 from discrepancy.joints.forecast import RESPONSE, SERIES, Forecasts
 from discrepancy.joints.problem import MOMENTS
 from discrepancy.joints.quantities import UNITS, WORDS, described
+from discrepancy.joints.same_kind import Comparison, Difference
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.files import write_json, write_text
@@ -61,6 +62,7 @@ FORMAT, VERSION = "mocobot-joint-calibration", 1
 MODEL, TABLE, NAME, REPORT = "as_found.xml", "parameters.csv", "calibration.json", "report.txt"
 KEYS = "format", "version", "model", "logs", "parameters", "combinations", "held_out", "validated", "notes"
 OPTIONAL = "provenance", "predicts", "forecasts", "same"
+COMPARISON, DIFFERENCE = ("names", "probability", "differences"), ("places", "parameter", "values", "se")
 PARAMETER = ("place", "parameter", "model", "value", "se", "prior_se", "determined", "in_model")
 HELD_OUT = ("model", "least_squares", "calibrated", "noise", "torque")
 QUANTITY = {"parameter": (
@@ -106,7 +108,7 @@ def to_dict(found: ArmCalibration) -> dict[str, Any]:
         },
         **({} if found.forecasts is None else {"forecasts": _forecasts(found, found.forecasts)}),
         **({} if not found.same else {"same": [
-            {"names": list(one.names), "sentence": one.sentence, "differences": [
+            {"names": list(one.names), "probability": one.probability, "differences": [
                 {"places": list(d.places), "parameter": d.name, "values": list(d.values), "se": d.se}
                 for d in one.differences
             ]}
@@ -439,6 +441,7 @@ class Told:
     notes: tuple[str, ...]
     predicts: str
     forecasts: Forecasts | None = None
+    same: tuple[Comparison, ...] = ()
 
     @property
     def found(self) -> ArmCalibration:
@@ -506,6 +509,7 @@ def from_dict(values: Mapping[str, Any], where: str) -> Told:
         SimpleNamespace(path=Path(file.words("model")), joints=joints, slides=slides), known, parameters, combinations,
         (HeldOut("", *table),), file.flag("validated"), file.texts("logs"), file.texts("notes"), predicts,
         _read_forecasts(file, [joints[j] for j in known], known) if "forecasts" in file else None,
+        tuple(map(_comparison, file.objects("same", COMPARISON))) if "same" in file else (),
     )  # fmt: skip
 
 
@@ -526,6 +530,21 @@ def _read_forecasts(file: Fields, names: Sequence[str], known: Sequence[int]) ->
         positions[j], inner = columns(own, SERIES, len(time)), own.within("response", RESPONSE)
         responses[j] = columns(inner, RESPONSE, len(inner.list("frequency_Hz")))
     return Forecasts(one.words("part"), time, positions, responses)
+
+
+def _comparison(one: Fields) -> Comparison:
+    differences = []
+    for own in one.objects("differences", DIFFERENCE):
+        own.check(QUANTITY)
+        places, values = own.texts("places"), own.array("values", (2,))
+        if len(places) != 2:
+            own.refuse("places", "two joints or links")
+        pair, both = (places[0], places[1]), (float(values[0]), float(values[1]))
+        differences.append(Difference(pair, own.text("parameter"), both, own.number("se", above=0.0)))
+    names = one.texts("names")
+    if len(names) != 2:
+        one.refuse("names", "two texts")
+    return Comparison((names[0], names[1]), tuple(differences), one.number("probability", 0.0))
 
 
 def _parameter(one: Fields) -> Parameter:
