@@ -69,7 +69,7 @@ def _differences(one: Comparison) -> Markup | None:
         cells = [value(scale * x, 4) for x in d.values]
         rows.append([f"{words} of {d.places[0]}", spelled(unit), *cells, measurement(off, scale * d.se)])
     return (
-        table("Machines of one kind", ("", "unit", *one.names, "difference"), rows, stack=True)
+        table("Determined in both", ("", "unit", *one.names, "difference"), rows, stack=True)
         if rows
         else None
     )
