@@ -1,8 +1,6 @@
 """Draft what a robot is told: the order of its motors, the gains of its loop, and what its position follows.
 
-Sources: the motors' order of Unitree's robots is that of ``go2`` and ``g1`` examples in
-github.com/unitreerobotics/unitree_sdk2; LeRobot's units are those of ``_normalize`` in
-github.com/huggingface/lerobot, src/lerobot/motors/motors_bus.py.
+LeRobot's units are those of ``_normalize`` in github.com/huggingface/lerobot, src/lerobot/motors/motors_bus.py.
 """
 
 from __future__ import annotations
@@ -18,7 +16,7 @@ import numpy as np
 from estimator.arrays import Array
 from estimator.quantisation import rounding_step
 from mocobot_logs.draft import DOUBTFUL
-from mocobot_logs.presets import Meaning
+from mocobot_logs.presets import MOTORS, Meaning
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,26 +47,11 @@ class Place:
 
 # Unitree.
 
-_LEG = ("hip", "thigh", "calf")
-_G1_LEG = ("hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll")
-_G1_ARM = (
-    "shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_roll", "wrist_pitch", "wrist_yaw",
-)  # fmt: skip
-_UNITREE: tuple[tuple[str, ...], ...] = (
-    tuple(f"{leg}_{name}" for leg in ("fr", "fl", "rr", "rl") for name in _LEG),
-    (
-        *(f"{side}_{name}" for side in ("left", "right") for name in _G1_LEG),
-        *("waist_yaw", "waist_roll", "waist_pitch"),
-        *(f"{side}_{name}" for side in ("left", "right") for name in _G1_ARM),
-    ),
-)
-"""Joints in the order of the motors: quadrupeds (Go2, Go1, A1, B2), G1 with 29 motors."""
-
 
 def motors_of(joints: Sequence[str]) -> dict[str, int] | None:
     """Return the motor of each joint, from 0, in a Unitree message; None if not all names are known."""
     plain = [joint.lower().removesuffix("_joint") for joint in joints]
-    for names in _UNITREE:
+    for names in MOTORS:
         if set(plain) <= set(names):
             return {joint: names.index(name) for joint, name in zip(joints, plain, strict=True)}
     return None

@@ -35,7 +35,7 @@ from mocobot_logs.draft_drives import (
     numbered,
     zero_lines,
 )
-from mocobot_logs.draft_names import TOKEN, UNITS, Robots
+from mocobot_logs.draft_names import TOKEN, Robots
 from mocobot_logs.formats import Kind, log_kind
 from mocobot_logs.joints.joint_map import (
     COMMANDS,
@@ -48,12 +48,11 @@ from mocobot_logs.joints.joint_map import (
 )
 from mocobot_logs.joints.read import unwrapped
 from mocobot_logs.presets import (
-    COMMANDING,
-    ORDERS,
-    TRAJECTORY,
-    TRAJECTORY_FIELDS,
-    TYPES,
+    JOINT_WORDS,
+    MESSAGES,
+    UNITS,
     Meaning,
+    Message,
     column_meaning,
     effort_meaning,
 )
@@ -64,19 +63,6 @@ from mocobot_logs.units import COUNTS, FACTORS, TIME_UNITS
 if TYPE_CHECKING:
     from mocobot_logs.bag.read import Clock, Look
 
-WORDS: dict[str, set[str]] = {
-    "enabled": {"enable", "enabled"},
-    "command": {
-        "cmd", "command", "commanded", "goal", "target", "ref", "reference", "desired", "des", "action", "setpoint"
-    },
-    "dq": {"dq", "qd", "vel", "velocity", "speed", "omega", "qdot"},
-    "torque": {"tau", "torque", "trq", "effort", "force"},
-    "current": {"current", "cur", "amp", "amps"},
-    "duty": {"pwm", "duty", "load"},
-    "supply": {"supply", "bus", "battery", "vin", "volts"},
-    "q": {"q", "pos", "position", "angle", "joint", "state", "ang"},
-}  # fmt: skip
-"""Words that identify a quantity, most specific first."""
 MOTOR = {"motor", "drive", "actuator", "rotor"}
 _AT_MOTOR = {
     "q": "motor_position",
@@ -378,7 +364,7 @@ def quantity_in(name: str) -> tuple[str | None, int, Meaning | None]:
     if meaning is not None:
         return meaning.quantity, 0, meaning
     words = {token.lower() for token in TOKEN.findall(re.sub(r"\{\w+\}|\[.*?\]", " ", name))}
-    for quantity, telling in WORDS.items():
+    for quantity, telling in JOINT_WORDS.items():
         if words & telling:
             rank = 1 + (words & telling <= _WEAK)
             return _AT_MOTOR.get(quantity, quantity) if words & MOTOR else quantity, rank, None
@@ -482,13 +468,14 @@ def _in_bag(path: Path, joints: Sequence[str]) -> _Found:
     of: dict[str, str] = {}  # the topic of each joint: that with most joints of the model
     for topic in sorted(named, key=lambda topic: -len(named[topic])):
         of = {joint: topic for joint in joints if joint in named[topic]} | of
-    orders = {topic: _index(look, topic, kind, joints) for topic, kind in types.items() if kind in COMMANDING}
+    listed = {topic: MESSAGES[kind] for topic, kind in types.items() if kind in MESSAGES}
+    orders = {topic: _index(look, topic, told, joints) for topic, told in listed.items() if told.commands}
     order = max(orders, key=lambda topic: len(orders[topic]), default=None)
     at, seat = orders[order] if order is not None else {}, dict[str, int]()
-    known = None if of else next((topic for topic in types if types[topic] in TYPES), None)
+    known = None if of else next((topic for topic, told in listed.items() if not told.commands), None)
     if known is not None:
         seat = _seats(joints)
-    elif not of and order is not None and types[order] == TRAJECTORY:
+    elif not of and order is not None and listed[order].named:
         known = order
     has = [joint for joint in joints if joint in (of or (at if known == order and order else joints))]
     has.sort(key=lambda joint: (seat or at).get(joint, len(joints)))
@@ -500,13 +487,13 @@ def _in_bag(path: Path, joints: Sequence[str]) -> _Found:
     if of:
         found.places = _states(look, has, {joint: of[joint] for joint in of if joint in has})
     elif known is not None and known != order:
-        for quantity, (path_there, meaning) in TYPES[types[known]].items():
-            found.places[quantity] = replace(numbered(known, path_there, seat, has), meaning=meaning)
+        for quantity, meaning in listed[known].fields.items():
+            found.places[quantity] = replace(numbered(known, meaning.paths[0], seat, has), meaning=meaning)
         if motors_of(joints) is None or "unitree" not in types[known]:
             numbers = ", ".join(f"{seat[joint]} is {joint}" for joint in has)
             found.doubts.append(f"messages number the joints; is this their order? {numbers}")
     if order is not None and at:
-        _order(found, look, order, types[order], at, clock)
+        _order(found, look, order, listed[order], at, clock)
     return found
 
 
@@ -515,25 +502,26 @@ def _seats(joints: Sequence[str]) -> dict[str, int]:
     return motors_of(joints) or {joint: k for k, joint in enumerate(joints)}
 
 
-def _index(look: Look, topic: str, kind: str, joints: Sequence[str]) -> dict[str, int]:
+def _index(look: Look, topic: str, told: Message, joints: Sequence[str]) -> dict[str, int]:
     """Return the index of each joint in messages that tell the robot what to do; empty if they name none."""
-    names = look.joint_names(topic) if kind == TRAJECTORY else ()
+    names = look.joint_names(topic) if told.named else ()
     return {joint: names.index(joint) for joint in joints if joint in names} if names else _seats(joints)
 
 
-def _order(found: _Found, look: Look, topic: str, kind: str, at: Mapping[str, int], clock: Clock) -> None:
+def _order(
+    found: _Found, look: Look, topic: str, message: Message, at: Mapping[str, int], clock: Clock
+) -> None:
     """Add what a topic of commands holds, and how the positions follow."""
-    fields = dict(ORDERS.get(kind, {}))
-    if kind == TRAJECTORY:
-        there = look.fields(topic)
-        for name, (unit, part, words) in TRAJECTORY_FIELDS.items():
-            word = next(word for word in words if word in there)
-            fields[name] = f"{word}.{part}[{{index}}]", Meaning(name, unit)
+    there = look.fields(topic)
+    fields = {
+        name: (next((p for p in field.paths if p.partition(".")[0] in there), field.paths[0]), field)
+        for name, field in message.fields.items()
+    }
     told = [joint for joint in found.joints if joint in at]
     paths = [path.replace("{index}", str(at[joint])) for path, _ in fields.values() for joint in told]
     stamps, values = look.series(topic, [(path, None) for path in paths], clock)
     columns = [found.joints.index(joint) for joint in told]
-    if kind in ORDERS and "current" in found.places:
+    if not message.named and "current" in found.places:
         said = 'instead of torques by the gains, with [drive] torque_constant = "free"'
         found.spare["current"] = found.places.pop("current").told(said)
     rows: dict[str, Array] = {}

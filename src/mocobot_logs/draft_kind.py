@@ -6,15 +6,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from mocobot_logs.draft import DOUBTFUL, Draft, draft_of, opened_table
-from mocobot_logs.draft_joints import MOTOR, WORDS, draft_joint_map, in_table, quantity_in
-from mocobot_logs.draft_names import TOKEN, UNITS
+from mocobot_logs.draft_joints import MOTOR, draft_joint_map, in_table, quantity_in
+from mocobot_logs.draft_names import TOKEN
 from mocobot_logs.formats import log_kind
 from mocobot_logs.joints.joint_map import COMMANDS, DUTIES, EFFORTS, POSITIONS
-from mocobot_logs.presets import arm_joints
+from mocobot_logs.presets import JOINT_WORDS, MESSAGES, UNITS
 from mocobot_logs.table.table import Table
 
 _MEASURED = {"act", "actual", "feedback", "meas", "measured", "present"}
-_NO_NAMES = set.union(*WORDS.values()) | MOTOR | _MEASURED | set(UNITS)
+_NO_NAMES = set.union(*JOINT_WORDS.values()) | MOTOR | _MEASURED | set(UNITS)
 """Words of a column's name that are not part of the joint's name."""
 _JOINT = {"joint", "axis"}
 """Words that belong to a joint's name if they stand beside it, as in ``joint_1`` and ``elbow_joint``."""
@@ -48,7 +48,8 @@ def _joints_of_bag(path: Path) -> tuple[list[str], bool]:
 
     look = Look(path)
     told = max((list(look.joints(topic)) for topic in look.types), key=len, default=[])
-    return (told, True) if told else (_numbered(max(map(arm_joints, look.types.values()), default=0)), False)
+    known = [MESSAGES[kind].joints for kind in look.types.values() if kind in MESSAGES]
+    return (told, True) if told else (_numbered(max(known, default=0)), False)
 
 
 def _joints_of_table(table: Table) -> list[str]:

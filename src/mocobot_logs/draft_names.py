@@ -14,6 +14,7 @@ import numpy as np
 
 from estimator.arrays import Array
 from estimator.errors import InputError
+from mocobot_logs.presets import TEAM_WORDS, UNITS
 from mocobot_logs.table.table import Table, Wanted
 from mocobot_logs.table.text import BrokenRowsError
 
@@ -23,29 +24,11 @@ if TYPE_CHECKING:
 JOINED = "\x1f"  # separator between topic, joint and field in a combined name
 INDEX = {"z": 2, "y": 1, "x": 0, "yaw": 2, "pitch": 1, "roll": 0}
 _TURNS = ("yaw", "pitch", "roll")
-_COMMAND = {"ref", "reference", "cmd", "command", "commanded", "setpoint", "desired", "target", "goal"}
-_TORQUE = {"tau", "torque", "trq", "tq", "moment"}
-_EFFORT = {"effort", "eff"}
-_FORCE = {"force", "f", "frc"}
-_GIMBAL = {"theta", "gimbal", "th"}
-_DRIVEN = {"phi", "q", "joint", "motor", "driven", "leg", "sea", "actuator"}
-_WRIST = {"h", "wrist", "hand"}
-_PLACE = {"pos", "position", "p", "point", "angle"}
-_OTHER = {
-    "velocity", "vel", "dq", "qd", "speed", "rate", "current", "temp", "temperature", "voltage", "acc", "imu", "status"
-}  # fmt: skip
-_TIME = {"time", "t", "stamp", "timestamp", "clock", "ts", "epoch"}
+_COMMAND, _TORQUE, _EFFORT, _FORCE, _GIMBAL, _DRIVEN, _WRIST, _PLACE, _TIME, _OTHER = (
+    TEAM_WORDS[key]
+    for key in ("command", "torque", "effort", "force", "gimbal", "driven", "wrist", "place", "time", "other")
+)
 _WORDS = _COMMAND | _TORQUE | _EFFORT | _FORCE | _GIMBAL | _DRIVEN | _WRIST | _PLACE
-UNITS = {
-    "rad": "rad", "rads": "rad", "radian": "rad", "radians": "rad",
-    "deg": "deg", "degs": "deg", "degree": "deg", "degrees": "deg", "°": "deg",
-    "count": "counts", "counts": "counts", "cnt": "counts", "cnts": "counts", "ticks": "counts",
-    "turns": "turn", "rpm": "rpm", "nm": "Nm", "mnm": "mNm", "nmm": "Nmm", "n": "N", "mn": "mN", "m": "m", "mm": "mm",
-    "a": "A", "ma": "mA", "v": "V", "mv": "mV", "volts": "V",
-    "s": "s", "sec": "s", "secs": "s", "seconds": "s", "ms": "ms", "msec": "ms", "us": "us", "usec": "us",
-    "µs": "us", "ns": "ns", "nsec": "ns",
-}  # fmt: skip
-"""Units of maps by the words in names."""
 _UNIT = re.compile(r"(?:\s*[\[(]\s*([^\[\]()]{1,12}?)\s*[\])]|[_.\s/-]([A-Za-z°µ]{1,7}))\s*$")
 TOKEN = re.compile(r"[A-Z]?[a-z°µ]+|[A-Z]+(?![a-z])|\d+")
 _GLUED = re.compile(r"(f|h|force|theta|ref|gimbal|cmd|pos|p)([xyz])")

@@ -12,7 +12,7 @@ from source_tree import SRC, module_files
 
 CEILINGS = {
     "estimator": 8_240,
-    "mocobot_logs": 7_370,
+    "mocobot_logs": 7_280,
     "mocobot_inspect": 2_930,
     "mocobot_sim": 6_370,
     "discrepancy": 14_720,

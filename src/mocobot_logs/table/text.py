@@ -11,7 +11,7 @@ import shlex
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, NoReturn
 
 import numpy as np
 import pyarrow as pa
@@ -60,16 +60,12 @@ def from_text(values: pa.Array, unit_ns: int | None, where: str, row: int = 0) -
     """
     digits = _DIGITS[_unit(unit_ns, where)]
     exact = pa.decimal128(38, digits)
-    try:
-        cut = pc.cast(values, exact, safe=False)
-    except pa.ArrowInvalid:
-        # The shortest prefix that does not cast ends with the faulty text.
-        bad = bisect_left(range(1, len(values)), True, key=lambda count: not _casts(values[:count], exact))
-        text = values[bad].as_py()
+    cut, bad = _cast(values, exact)
+    if cut is None:
         or_date = "" if row + bad else " or a date of ISO 8601, such as 2026-03-01T12:00:00.5Z"
         raise InputError(
-            f"{where} is {text!r:.60} in row {row + bad}; a time must be a number{or_date}"
-        ) from None
+            f"{where} is {values[bad].as_py()!r:.60} in row {row + bad}; a time must be a number{or_date}"
+        )
     _in_ns(cut, values, where, row)
     finer = pc.cast(values, pa.decimal256(76, digits + _BELOW_NS), safe=False)
     rounded = pc.cast(pc.call_function("round", [finer], pc.RoundOptions(digits)), exact)
@@ -93,9 +89,18 @@ def _unit(unit_ns: int | None, where: str) -> int:
     return unit_ns
 
 
-def _casts(values: pa.Array, kind: pa.DataType) -> bool:
+def _cast(text: pa.Array, kind: pa.DataType) -> tuple[pa.Array | None, int]:
+    """Return text as another type; None, and the row of the first text that is none, if one is not."""
     try:
-        pc.cast(values, kind, safe=False)
+        return pc.cast(text, kind, safe=False), 0
+    except pa.ArrowInvalid:
+        # The shortest prefix that does not cast ends with the faulty text.
+        return None, bisect_left(range(1, len(text)), True, key=lambda count: not _casts(text[:count], kind))
+
+
+def _casts(text: pa.Array, kind: pa.DataType) -> bool:
+    try:
+        pc.cast(text, kind, safe=False)
     except pa.ArrowInvalid:
         return False
     return True
@@ -110,12 +115,23 @@ def _refuse(values: NDArray | pa.Array, beyond: Given, where: str, row: int) -> 
         )
 
 
-_DATE = r"[0-9]{4}-[0-9]{2}-[0-9]{2}|[0-9]{8}"
-_TIME = r"[0-9]{2}(?::[0-9]{2}(?::[0-9]{2})?|[0-9]{2}(?:[0-9]{2})?)"
-_ZONE = r"[Zz]|UTC|[+-][0-9]{2}(?::?[0-9]{2})?"
-_PATTERN = rf"(?P<date>{_DATE})[Tt ](?P<time>{_TIME})(?:[.,](?P<fraction>[0-9]{{1,18}}))? ?(?P<zone>{_ZONE})?"
-_ISO = re.compile(_PATTERN)
-_S = 1_000_000_000
+_DATE_AND_TIME = (
+    r"([0-9]{4}-[0-9]{2}-[0-9]{2}|[0-9]{8})[Tt ][0-9]{2}(:[0-9]{2}(:[0-9]{2})?|[0-9]{2}([0-9]{2})?)"
+    r"([.,][0-9]{1,18})?"
+)
+_ZONE = r" ?([Zz]|UTC|[+-][0-9]{2}(:?[0-9]{2})?)"
+_ISO = re.compile(f"{_DATE_AND_TIME}(?P<zone>{_ZONE})?")
+_PLAIN = (
+    (r"^(....)(..)(..)([Tt ])", r"\1-\2-\3\4"),
+    (r"^(.{10})[Tt ](..)([0-9]{2})", r"\1 \2:\3"),
+    (r"^(.{16})([0-9]{2})", r"\1:\2"),
+    (r"^(.{16})([.,])", r"\1:00\2"),
+    (r"[.,]([0-9]{1,9})[0-9]*", r".\1"),
+    (r"^(.{10})[Tt]", r"\1 "),
+    (r" ?(z|Z|UTC)$", "Z"),
+    (r" ([+-][0-9:]+)$", r"\1"),
+)
+"""Patterns, and what replaces them in turn, from any way to write a date to the one that pyarrow reads."""
 EXAMPLE = "2026-03-01T12:00:00.000000001Z"
 _MUST = f"a time must be a date like {EXAMPLE}"
 
@@ -153,36 +169,30 @@ class TextClock:
 
     def _dates(self, values: pa.Array, row: int) -> tuple[Stamps, Given]:
         given = values.is_valid().to_numpy(zero_copy_only=False)
-        parts = pc.call_function("extract_regex", [values], pc.ExtractRegexOptions(f"^(?:{_PATTERN})$"))
-        no_date = given & ~parts.is_valid().to_numpy(zero_copy_only=False)
-        if no_date.any():
-            self._refuse(values, no_date, row, f"{_MUST}, as the first one is")
-        zone = _part(parts, "zone", "")
-        zoned = pc.call_function("not_equal", [zone, pa.scalar("")]).to_numpy(zero_copy_only=False)
-        if (other := given & (zoned != (self._form == "zone"))).any():
-            which = "with a time zone" if self._form == "zone" else "without a time zone"
-            self._refuse(values, other, row, f"all times must be {which}, as the first one is")
-        date, clock = _digits(_part(parts, "date", "19700101")), _digits(_part(parts, "time", "00"))
-        moment = _padded(date, 8) * 10**6 + _padded(clock, 6)
-        below = _padded(_part(parts, "fraction", ""), 9)
-        seconds = self._seconds(values, moment, row) - _zone_s(zone)
-        beyond = np.abs(seconds) >= LARGEST_NS // _S
-        if beyond.any():
-            self._refuse(values, beyond, row, "it must be within 292 years of 1970")
-        return np.where(given, seconds * _S + below, 0), given
+        zone = "with" if self._form == "zone" else "without"
+        for pattern, why in (
+            (_DATE_AND_TIME + f"({_ZONE})?", f"{_MUST}, as the first one is"),
+            (
+                _DATE_AND_TIME + f"({_ZONE})" * (zone == "with"),
+                f"all times must be {zone} a time zone, as the first one is",
+            ),
+        ):
+            options = pc.MatchSubstringOptions(f"^(?:{pattern})$")
+            fits = pc.fill_null(pc.call_function("match_substring_regex", [values], options), True)
+            if not (fitting := fits.to_numpy(zero_copy_only=False)).all():
+                self._refuse(values, ~fitting, row, why)
+        plain = values
+        for pattern, by in _PLAIN:
+            plain = pc.call_function(
+                "replace_substring_regex", [plain], pc.ReplaceSubstringOptions(pattern, by)
+            )
+        read, bad = _cast(plain, pa.timestamp("ns", "UTC" if zone == "with" else None))
+        if read is None:
+            why = "there is no such date or time of day within 292 years of 1970"
+            self._refuse(values, np.arange(len(values)) == bad, row, why)
+        return pc.fill_null(read.cast(pa.int64()), 0).to_numpy(zero_copy_only=False), given
 
-    def _seconds(self, values: pa.Array, number: Stamps, row: int) -> Stamps:
-        """Return seconds of UTC from 14-digit numbers: year, month, day, hour, minute, second."""
-        months, days, hours, minutes, seconds = (number // 10**k % 100 for k in (8, 6, 4, 2, 0))
-        first = ((number // 10**10 - 1970) * 12 + months - 1).astype("datetime64[M]").astype("datetime64[D]")
-        date = first + (days - 1)
-        wrong = (months < 1) | (months > 12) | (date.astype("datetime64[M]") != first.astype("datetime64[M]"))
-        wrong |= (hours > 23) | (minutes > 59) | (seconds > 59)
-        if wrong.any():
-            self._refuse(values, wrong, row, "there is no such date or time of day")
-        return date.astype(np.int64) * 86_400 + hours * 3600 + minutes * 60 + seconds
-
-    def _refuse(self, values: pa.Array, bad: Given, row: int, why: str) -> None:
+    def _refuse(self, values: pa.Array, bad: Given, row: int, why: str) -> NoReturn:
         first = int(np.flatnonzero(bad)[0])
         raise InputError(f"{self._where} is {values[first].as_py()!r:.60} in row {row + first}; {why}")
 
@@ -199,31 +209,6 @@ def _is_float(text: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _part(parts: pa.Array, name: str, default: str) -> pa.Array:
-    """Return one group of the pattern, the default where it is missing."""
-    return pc.fill_null(pc.call_function("struct_field", [parts], pc.StructFieldOptions([name])), default)
-
-
-def _digits(text: pa.Array) -> pa.Array:
-    options = pc.ReplaceSubstringOptions("[^0-9]", "")
-    return pc.call_function("replace_substring_regex", [text], options)
-
-
-def _padded(digits: pa.Array, width: int) -> Stamps:
-    """Return digits as numbers, padded with trailing zeros or cut to ``width`` digits."""
-    padded = pc.call_function("utf8_rpad", [digits], pc.PadOptions(width, "0"))
-    cut = pc.call_function("utf8_slice_codeunits", [padded], pc.SliceOptions(0, width))
-    return cut.cast(pa.int64()).to_numpy(zero_copy_only=False)
-
-
-def _zone_s(zone: pa.Array) -> Stamps:
-    """Return the offset of each zone from UTC [s]."""
-    number = _padded(_digits(zone), 4)
-    behind = pc.call_function("starts_with", [zone], pc.MatchSubstringOptions("-"))
-    sign = np.where(behind.to_numpy(zero_copy_only=False), -1, 1)
-    return sign * (number // 100 * 3600 + number % 100 * 60)
 
 
 _COMMENT = re.compile(rb"^[ \t]*#.*\n?", re.MULTILINE)
