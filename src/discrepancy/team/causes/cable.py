@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import product
 from typing import ClassVar
 
@@ -13,6 +13,7 @@ from discrepancy.numbers import Numbers
 from discrepancy.team.causes.base import REACH_M, Cause, Context, Shape, by_axis, stack
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
+from estimator.so3 import cross
 
 CABLES, CABLE_LINES = 10_000, 100
 """Distinguishable cables: directions 0.1 rad apart times eight stretches; their lines at the payload, 0.1 m apart."""
@@ -127,7 +128,7 @@ class Tied(Cause):
     parameters = ("force_x_N", "force_y_N", "force_z_N", "stiffness_N_per_m")
     scales = (0.1, 0.1, 0.1, 1.0)
     determined: ClassVar[Mapping[str, float]] = SLOPE_STEPS
-    absolute: ClassVar[Mapping[str, float]] = SLOPE_STEPS
+    absolute: ClassVar[Collection[str]] = SLOPE_STEPS
     positive = ("stiffness_N_per_m",)
     separate = "A run without payload, or a second payload at the same place, separates an outside force from a sensor."
 
@@ -153,7 +154,7 @@ class Tied(Cause):
         else:
             forces = [*(np.broadcast_to(axis, moved.shape) for axis in np.eye(3)), -moved]
         forces = [np.einsum("qij,qj->qi", R_1b, force) for force in forces]
-        pulls = [trial.of_wrench(force, np.cross(point, force)) for force in forces]
+        pulls = [trial.of_wrench(force, cross(point, force)) for force in forces]
         return stack(
             [*([np.zeros_like(pulls[0])] * (4 - len(pulls))), *pulls]
         )  # a cable has no force at home
@@ -224,7 +225,7 @@ class PayloadTether(Tied):
         *(through(np.zeros(3), way) for way in first_ways()),
     )
     determined: ClassVar[Mapping[str, float]] = {**dict.fromkeys(LEVERS, TETHER_STEP_M), **SLOPE_STEPS}
-    absolute: ClassVar[Mapping[str, float]] = determined
+    absolute: ClassVar[Collection[str]] = determined
 
     def sentence(self, n):
         return self.pulls(n, f"the payload's point {n.vector('point', 'm')} in {{1}}", "robot 1's")
