@@ -144,16 +144,17 @@ class Tied(Cause):
         return f"{said}, along itself alone, {ends} and stiffens by {n('stiffening_N_per_m2', 'N/m^2')}"
 
     @abstractmethod
-    def attached(self, trial: TrialLinear, robot: int, shape: Shape) -> tuple[Array, Array, Array]:
-        """Rotation from {b} to {1} (Q, 3, 3), the point in {1} (3,), and its displacement from home in {b} (Q, 3)."""
+    def attached(self, trial: TrialLinear, robot: int, shape: Shape) -> tuple[Array, Array]:
+        """The point in {1}, shape (3,), and its displacement from home in {b}, shape (Q, 3)."""
 
     def columns(self, trial, robot, joint, shape):
-        R_1b, point, moved = self.attached(trial, robot, shape)
+        point, moved = self.attached(trial, robot, shape)
+        R_bi, R_1i = trial.data.R_bi[:, robot], trial.shared.grasps.R_1i[robot]
         if is_cable(shape):
             forces = [pull(shape, moved)]
         else:
             forces = [*(np.broadcast_to(axis, moved.shape) for axis in np.eye(3)), -moved]
-        forces = [np.einsum("qij,qj->qi", R_1b, force) for force in forces]
+        forces = [np.einsum("qji,qj->qi", R_bi, force) @ R_1i.T for force in forces]
         pulls = [trial.of_wrench(force, cross(point, force)) for force in forces]
         return stack(
             [*([np.zeros_like(pulls[0])] * (4 - len(pulls))), *pulls]
@@ -193,9 +194,8 @@ class Tether(Tied):
         return self.pulls(n, "the grasp", "its")
 
     def attached(self, trial, robot, shape):
-        data, grasps = trial.data, trial.shared.grasps
-        R_1b = grasps.R_1i[robot] @ np.swapaxes(data.R_bi[:, robot], 1, 2)
-        return R_1b, grasps.p_1i[robot], data.p_bi[:, robot] - [0.0, 0.0, trial.design.home_height_m]
+        moved = trial.data.p_bi[:, robot] - [0.0, 0.0, trial.design.home_height_m]
+        return trial.shared.grasps.p_1i[robot], moved
 
     def further(self, shape):
         return every_way()
@@ -234,7 +234,7 @@ class PayloadTether(Tied):
         R, p = trial.data.R_bi[:, 0], trial.data.p_bi[:, 0]  # {1} in {b1}
         point = trial.shared.pi[1:4] / trial.shared.pi[0] + _lever(shape)
         moved = p + R @ point - (np.array([0.0, 0.0, trial.design.home_height_m]) + point)
-        return np.swapaxes(R, 1, 2), point, moved
+        return point, moved
 
     def further(self, shape):
         at = _lever(shape)
