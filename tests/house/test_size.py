@@ -15,7 +15,7 @@ CEILINGS = {
     "mocobot_logs": 7_280,
     "mocobot_inspect": 2_930,
     "mocobot_sim": 6_370,
-    "discrepancy": 14_720,
+    "discrepancy": 14_658,
     "mocobot_view": 2_240,
     "mocobot_report": 2_790,
     "mocobot": 4_990,

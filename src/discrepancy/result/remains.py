@@ -10,7 +10,7 @@ from discrepancy.numbers import one_each, parameter, three_digits
 from discrepancy.result.read import is_of_joints, kind_of
 
 VISIBLE_CHI2_PER_N = 3.0
-"""Least chi2/n of the closed loop to report."""
+"""Closed-loop chi2/n above which it is reported, and the deviations of healthy parts are simulated, too. Chosen."""
 
 RESPONSE_SHARE = 0.8
 """Share of the response's excess error that causes must remove; below it, the rest is reported."""

@@ -168,9 +168,8 @@ def directions_at(linear: TrialLinear, place: Place) -> Array:
         slots = (PHI, PHI_DOT, PHI_DDOT) if place.name == "phi reading" else (THETA, THETA_DOT, THETA_DDOT)
         J = [linear.J.at(robot, kind, at)[..., joint] for kind in slots]
         return np.stack(J, axis=1)[:, None]
-    if place.name in ("tau reading", "driven torque"):
-        sign = 1.0 if place.name == "tau reading" else -1.0  # a torque parallel to the spring is not read
-        return sign * linear.J.at(robot, TAU, at)[:, None, None, :, joint]
+    if place.name == "tau reading":
+        return linear.J.at(robot, TAU, at)[:, None, None, :, joint]
     if place.name == "gimbal torque":
         moment = moment_about_axes(linear.s[at][:, robot, THETA], np.eye(3)[joint])
         moment = moment @ linear.shared.grasps.R_1i[robot].T

@@ -19,6 +19,7 @@ from discrepancy.evidence.probability import Odds, Rival
 from discrepancy.evidence.search import Chosen, Key, Search, State
 from discrepancy.formulas.law import Law
 from discrepancy.numbers import three_digits
+from discrepancy.result.remains import VISIBLE_CHI2_PER_N
 from discrepancy.team.closed_loop import (
     MARGIN_SHARE,
     Gain,
@@ -45,8 +46,6 @@ TOLD_NATS = 5.0
 """Log odds for the cause with a better simulated response, if it is better by the margin. Chosen."""
 CONTRADICTED = 0.5
 """Factor on the probability of causes that make the response worse. Chosen: as likely wrong as right."""
-VISIBLE_CHI2_PER_N = 3.0
-"""Closed-loop chi2/n above which the deviations of healthy parts are simulated, too. Chosen."""
 Active = list[tuple[Candidate, Array]]
 """Candidates and the values of their parameters."""
 

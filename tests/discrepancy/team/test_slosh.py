@@ -172,20 +172,25 @@ def swinging(time, accel, lengths_m, damping, fixed):
     return np.array([v for v, _ in each]), np.array([a for _, a in each])
 
 
-def test_slosh(case, motion):
-    """A pendulum under a moving point; the columns take it near the centre."""
-    mass, at, shape = 0.4, COM + np.array([0.02, -0.03, 0.01]), {"length_m": 0.2, "damping_ratio": 0.05}
+PLAIN = {"length_m": 0.2, "damping_ratio": 0.05}
+
+
+def swung_payload(case, motion, mass, at):
+    """Force and moment on the payload of a pendulum of ``PLAIN`` below a point in {1}, shape (Q, 3) each."""
     time, up = case.signals.time, np.array([0.0, 0.0, 1.0])
     accel = make_interp_spline(time, point(motion, at), k=5).derivative(2)
-    w = np.sqrt(DESIGN.gravity_mps2 / shape["length_m"])
-    # To the payload.
-    fixed = make_interp_spline(time, 0.2 * np.cross(up, turning(motion, time))[:, :2], k=3)
+    fixed = make_interp_spline(time, 0.2 * np.cross(up, turning(motion, time))[:, :2], k=3)  # to the payload
     speed, swung = swinging(time, accel, (0.2, 0.2), 0.05, fixed)
-    force = -mass * swung
     behind = np.column_stack([speed[:, :2] - fixed(time), np.zeros(len(time))])
+    w = np.sqrt(DESIGN.gravity_mps2 / 0.2)
     damped = np.cross([0.0, 0.0, -0.2], 2 * 0.05 * w * mass * behind)  # it pulls at the mass
-    values = np.append(mass, mass * (at - COM))
-    moment = np.cross(motion[0] @ at, force) + damped
+    return -mass * swung, np.cross(motion[0] @ at, -mass * swung) + damped
+
+
+def test_slosh(case, motion):
+    """A pendulum under a moving point; the columns take it near the centre."""
+    mass, at, shape = 0.4, COM + np.array([0.02, -0.03, 0.01]), PLAIN
+    values, (force, moment) = np.append(mass, mass * (at - COM)), swung_payload(case, motion, mass, at)
     check_wrench(case, motion, "slosh", 0, 0, shape, values, force, moment, 0.03)
     physical = reported(case, "slosh", values, shape)
     np.testing.assert_allclose([physical[f"point_{a}_m"] for a in "xyz"], at)
@@ -195,16 +200,8 @@ def test_slosh(case, motion):
 def test_a_pendulum_far_from_the_centre_is_swung_where_it_hangs(case, motion):
     """Its moments are about the centre of mass all the same; from there, straight lines leave more."""
     mass, off = 0.4, np.array([0.1, -0.2, 0.25])
-    time, up = case.signals.time, np.array([0.0, 0.0, 1.0])
-    accel = make_interp_spline(time, point(motion, COM + off), k=5).derivative(2)
-    fixed = make_interp_spline(time, 0.2 * np.cross(up, turning(motion, time))[:, :2], k=3)
-    speed, swung = swinging(time, accel, (0.2, 0.2), 0.05, fixed)
-    force = -mass * swung
-    behind = np.column_stack([speed[:, :2] - fixed(time), np.zeros(len(time))])
-    w = np.sqrt(DESIGN.gravity_mps2 / 0.2)
-    damped = np.cross([0.0, 0.0, -0.2], 2 * 0.05 * w * mass * behind)
-    moment = np.cross(motion[0] @ (COM + off), force) + damped
-    values, plain = np.append(mass, mass * off), {"length_m": 0.2, "damping_ratio": 0.05}
+    force, moment = swung_payload(case, motion, mass, COM + off)
+    values, plain = np.append(mass, mass * off), PLAIN
     there = plain | dict(zip(OFF, off.tolist(), strict=True))
     check_wrench(case, motion, "slosh", 0, 0, there, values, force, moment, 0.02)
     changed = residual_of(case, relieved(case, motion, force, moment)) - case.linear.residual
@@ -219,9 +216,7 @@ def test_a_pendulum_far_from_the_centre_is_swung_where_it_hangs(case, motion):
 @pytest.mark.parametrize(("second_m", "share"), [(0.08, 0.3), (0.5, 0.4)])
 def test_slosh_of_a_second_pendulum(case, motion, second_m, share):
     """Beside the first: what two of one mode do, each with its share of the mass."""
-    mass, moments = 0.4, 0.4 * np.array([0.02, -0.03, 0.01])
-    plain = {"length_m": 0.2, "damping_ratio": 0.05}
-    values = np.append(mass, moments)
+    plain, values = PLAIN, 0.4 * np.array([1.0, 0.02, -0.03, 0.01])
 
     def of(shape):
         return CAUSES["slosh"].columns(case.linear, 0, 0, shape) @ values

@@ -3,7 +3,7 @@
 import inspect
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
@@ -19,6 +19,9 @@ from estimator.arrays import Array
 
 Shape = Mapping[str, float]
 At = Literal["driven joint", "gimbal joint", "robot", "grasp", "payload"]
+
+REACH_M = 1.5
+"""Largest distance from the centre of mass to a point of the payload [m]. Chosen: no payload of three is larger."""
 
 GIMBAL_AXES = {1: "z (first)", 2: "y (middle)", 3: "x (last)"}
 
@@ -62,7 +65,9 @@ class Cause(ABC):
         at: the part that it acts on. Every robot has its own, except for the payload.
         joints: joints that it can act on, from 1.
         shapes: alternative numbers that change the columns themselves; the first one is in the catalogue.
-        determined: shape numbers that the data determine, and the size of their finite differences (``slope_step``).
+        determined: shape numbers that the data determine, and the step of their finite differences over the number.
+        absolute: those of them whose step is given in their own unit, because the number may be zero.
+        refined: shape numbers of a finer search, with the factors on each and the range of its size.
         clipped: parameters of the effect that are set to zero if the fit makes them negative.
         by_clocks: whether it only acts through the robots' clocks, so that it is invisible if the motion aligned them.
         adjusted: whether it is a function of the readings, which are then taken without their noise.
@@ -83,6 +88,8 @@ class Cause(ABC):
     joints: ClassVar[tuple[int, ...]] = (1, 2, 3)
     shapes: ClassVar[tuple[Shape, ...]] = ({},)
     determined: ClassVar[Mapping[str, float]] = {}
+    absolute: ClassVar[Collection[str]] = ()
+    refined: ClassVar[Mapping[str, tuple[Sequence[float], tuple[float, float]]]] = {}
     clipped: ClassVar[tuple[str, ...]] = ()
     by_clocks: ClassVar[bool] = False
     adjusted: ClassVar[bool] = False
@@ -143,8 +150,12 @@ class Cause(ABC):
         return None
 
     def finer(self, shape: Shape) -> Sequence[Shape]:
-        """Shapes near a chosen one, for a finer search."""
-        return []
+        """Shapes near a chosen one, for a finer search: those of ``refined``, with one number changed each."""
+        near = (
+            (name, shape[name] * factor, span)
+            for name, (factors, span) in self.refined.items() if name in shape for factor in factors
+        )  # fmt: skip
+        return [{**shape, name: x} for name, x, (least, most) in near if least <= abs(x) <= most]
 
     def further(self, shape: Shape) -> Sequence[Shape]:
         """Shapes with additional features, tried once the best simple shape is found."""
@@ -163,8 +174,8 @@ class Cause(ABC):
         return self.among
 
     def slope_step(self, name: str, number: float) -> float:
-        """Step of a shape number for finite differences, by default a share of the number."""
-        return self.determined[name] * abs(number)
+        """Step of a shape number for finite differences."""
+        return self.determined[name] * (1.0 if name in self.absolute else abs(number))
 
     def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Patches:
         """Columns of latent states that a cause adds to one trial, such as the friction torque of a joint at rest."""
@@ -235,6 +246,11 @@ class ReadingError(Cause):
             scaled = {name: np.broadcast_to(value * x, (len(signals.time), 3)) for name, x in error.items()}
             signals = signals.minus(**{n: one_robot(x, trial.robots, robot) for n, x in scaled.items()})
         return signals
+
+
+def by_axis(name: str, unit: str, vector: Array) -> dict[str, float]:
+    """Parameters ``name_x_unit``, ``name_y_unit`` and ``name_z_unit`` of an effect, from a vector of shape (3,)."""
+    return {f"{name}_{axis}_{unit}": float(x) for axis, x in zip("xyz", vector, strict=True)}
 
 
 def one_joint(values: Array, joint: int) -> Array:

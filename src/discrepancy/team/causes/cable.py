@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from abc import abstractmethod
+from collections.abc import Collection, Mapping, Sequence
 from itertools import product
 from typing import ClassVar
 
 import numpy as np
 
 from discrepancy.numbers import Numbers
-from discrepancy.team.causes.base import Cause, Shape
+from discrepancy.team.causes.base import REACH_M, Cause, Context, Shape, by_axis, stack
+from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
+from estimator.so3 import cross
 
 CABLES, CABLE_LINES = 10_000, 100
 """Distinguishable cables: directions 0.1 rad apart times eight stretches; their lines at the payload, 0.1 m apart."""
@@ -80,41 +83,6 @@ def lever(shape: Shape) -> Array:
     return np.asarray(to - to @ u * u, dtype=np.float64)
 
 
-def tied(values: Array, shape: Shape, home: Array) -> dict[str, float]:
-    """Convert a tether to the effect's parameters: stiffness, anchor, and the length below which it is slack.
-
-    Args:
-        values: of a tether's columns, shape (4,).
-        shape: its shape, a cable's or not.
-        home: attachment point on the payload at home [m], in {b}, shape (3,).
-    """
-    stiffness = values[3] if abs(values[3]) > 1e-6 else 1e-6
-    away, length_m = values[:3] / stiffness, 0.0
-    if is_cable(shape):
-        away = direction(shape) / _near(shape)
-        length_m = max(1.0 / _near(shape) - shape[STRETCH], 0.0)
-    anchor = {f"anchor_{axis}_m": float(x) for axis, x in zip("xyz", home + away, strict=True)}
-    strength = {"length_m": length_m, "stiffening_N_per_m2": float(stiffness) * _stiffens(shape)}
-    return {"stiffness_N_per_m": float(stiffness)} | anchor | strength
-
-
-def beside_force(columns: Sequence[Array]) -> Array:
-    """Columns of a tether, shape (n, C, 4): force at home, which is zero for a cable, and stiffness."""
-    out = np.zeros((*columns[0].shape, 4))
-    out[..., 4 - len(columns) :] = np.stack(columns, axis=-1)
-    return out
-
-
-def slack(n: Numbers) -> str:
-    """Part of a tether's sentence about its slack length and stiffening."""
-    if not n.values.get("length_m"):
-        return ""
-    below = n("length_m", "m")
-    if not n.values["stiffening_N_per_m2"]:
-        return f", along itself alone, and is slack below {below}"
-    return f", along itself alone, is slack below {below} and stiffens by {n('stiffening_N_per_m2', 'N/m^2')}"
-
-
 def every_way(stretches_m: Sequence[float] = CABLE_STRETCHES_M) -> list[Shape]:
     """Shapes of cables from every side, with each of some stretches."""
     ways = product(range(6), CABLE_TURNS, CABLE_TURNS, stretches_m)
@@ -127,21 +95,6 @@ def every_way(stretches_m: Sequence[float] = CABLE_STRETCHES_M) -> list[Shape]:
 def first_ways() -> list[Shape]:
     """Shapes of cables that are tried first."""
     return every_way(CABLE_STRETCHES_M[:1])
-
-
-def otherwise_slack(shape: Shape) -> list[Shape]:
-    """The same cable with other stretches. No gradient leads from a cable that is never slack to one that is."""
-    return [{**shape, STRETCH: e} for e in CABLE_STRETCHES_M] if is_cable(shape) else []
-
-
-def strap(shape: Shape) -> list[Shape]:
-    """The same cable as a strap, whose stiffness may grow."""
-    return [{**shape, STIFFENS: 0.0}] if is_cable(shape) and STIFFENS not in shape else []
-
-
-def alike(shape: Shape) -> int:
-    """Number of equally probable cables that differ in shape only."""
-    return CABLES * (STRAPS if STIFFENS in shape else 1)
 
 
 def through(at: Array, shape: Shape) -> Shape:
@@ -164,64 +117,92 @@ def _stiffens(shape: Shape) -> float:
     return float(np.clip(shape.get(STIFFENS, 0.0), *CABLE_STIFFENS_RANGE_PER_M))
 
 
-class Tether(Cause):
-    """Force k (anchor - grasp) on the payload at a robot's grasp, with the anchor fixed in that robot's {b}.
+class Tied(Cause):
+    """Force k (anchor - point) on a point of the payload, with the anchor fixed in a robot's {b}.
 
     The columns are the force at home and the stiffness. With ``stretch_m`` in its shape it is a cable, which has a
     stiffness only.
     """
 
-    title = "tether at {grasp}"
     family = "sea_torque"
     parameters = ("force_x_N", "force_y_N", "force_z_N", "stiffness_N_per_m")
     scales = (0.1, 0.1, 0.1, 1.0)
-    at = "grasp"
-    shapes = ({}, *first_ways())
     determined: ClassVar[Mapping[str, float]] = SLOPE_STEPS
+    absolute: ClassVar[Collection[str]] = SLOPE_STEPS
     positive = ("stiffness_N_per_m",)
     separate = "A run without payload, or a second payload at the same place, separates an outside force from a sensor."
 
-    def sentence(self, n):
-        return (
-            f"something like a cable pulls at the grasp with {n('stiffness_N_per_m', 'N/m')} towards "
-            f"{n.vector('anchor', 'm')} in its base frame{slack(n)}"
-        )
+    def pulls(self, n: Numbers, point: str, frame: str) -> str:
+        """Describe the pull at a point towards an anchor in a frame, and where the cable is slack and stiffens."""
+        said = f"something like a cable pulls at {point} with {n('stiffness_N_per_m', 'N/m')} towards "
+        said += f"{n.vector('anchor', 'm')} in {frame} base frame"
+        if not n.values.get("length_m"):
+            return said
+        ends = f"is slack below {n('length_m', 'm')}"
+        if not n.values["stiffening_N_per_m2"]:
+            return f"{said}, along itself alone, and {ends}"
+        return f"{said}, along itself alone, {ends} and stiffens by {n('stiffening_N_per_m2', 'N/m^2')}"
+
+    @abstractmethod
+    def attached(self, trial: TrialLinear, robot: int, shape: Shape) -> tuple[Array, Array]:
+        """The point in {1}, shape (3,), and its displacement from home in {b}, shape (Q, 3)."""
 
     def columns(self, trial, robot, joint, shape):
-        data, grasps = trial.data, trial.shared.grasps
-        home = np.array([0.0, 0.0, trial.design.home_height_m])
-        moved = data.p_bi[:, robot] - home
+        point, moved = self.attached(trial, robot, shape)
+        R_bi, R_1i = trial.data.R_bi[:, robot], trial.shared.grasps.R_1i[robot]
         if is_cable(shape):
             forces = [pull(shape, moved)]
         else:
             forces = [*(np.broadcast_to(axis, moved.shape) for axis in np.eye(3)), -moved]
-        columns = []
-        for force_b in forces:
-            force = np.einsum("qji,qj->qi", data.R_bi[:, robot], force_b) @ grasps.R_1i[robot].T
-            columns.append(trial.of_wrench(force, np.cross(grasps.p_1i[robot], force)))
-        return beside_force(columns)
+        forces = [np.einsum("qji,qj->qi", R_bi, force) @ R_1i.T for force in forces]
+        pulls = [trial.of_wrench(force, cross(point, force)) for force in forces]
+        return stack(
+            [*([np.zeros_like(pulls[0])] * (4 - len(pulls))), *pulls]
+        )  # a cable has no force at home
+
+    def finer(self, shape):
+        """The same cable with other stretches. No gradient leads from a cable that is never slack to one that is."""
+        return [{**shape, STRETCH: e} for e in CABLE_STRETCHES_M] if is_cable(shape) else []
+
+    def grown(self, shape):
+        """The same cable as a strap, whose stiffness may grow."""
+        return [{**shape, STIFFENS: 0.0}] if is_cable(shape) and STIFFENS not in shape else []
+
+    def alike(self, shape):
+        return CABLES * (STRAPS if STIFFENS in shape else 1) if is_cable(shape) else self.among
+
+    def tied(self, values: Array, context: Context, point: Array | float = 0.0) -> dict[str, float]:
+        """Stiffness, anchor in {b}, and the length below which it is slack, of a point (3,) in {b} beside the wrist."""
+        shape, home = context.shape, np.array([0.0, 0.0, context.home_height_m]) + point
+        stiffness = values[3] if abs(values[3]) > 1e-6 else 1e-6
+        away, length_m = values[:3] / stiffness, 0.0
+        if is_cable(shape):
+            away = direction(shape) / _near(shape)
+            length_m = max(1.0 / _near(shape) - shape[STRETCH], 0.0)
+        strength = {"length_m": length_m, "stiffening_N_per_m2": float(stiffness) * _stiffens(shape)}
+        return {"stiffness_N_per_m": float(stiffness)} | by_axis("anchor", "m", home + away) | strength
+
+
+class Tether(Tied):
+    """A tether at a robot's grasp, with the anchor fixed in that robot's {b}."""
+
+    title = "tether at {grasp}"
+    at = "grasp"
+    shapes = ({}, *first_ways())
+
+    def sentence(self, n):
+        return self.pulls(n, "the grasp", "its")
+
+    def attached(self, trial, robot, shape):
+        moved = trial.data.p_bi[:, robot] - [0.0, 0.0, trial.design.home_height_m]
+        return trial.shared.grasps.p_1i[robot], moved
 
     def further(self, shape):
         return every_way()
 
-    def grown(self, shape):
-        return strap(shape)
-
-    def finer(self, shape):
-        return otherwise_slack(shape)
-
-    def alike(self, shape):
-        return alike(shape) if is_cable(shape) else self.among
-
-    def slope_step(self, name, number):
-        return self.determined[name]
-
     def physical(self, values, context):
-        return tied(values, context.shape, np.array([0.0, 0.0, context.home_height_m]))
+        return self.tied(values, context)
 
-
-SLOSH_REACH_M = 1.5
-"""Largest distance from centre of mass to attachment point [m]. Chosen: no payload of three robots is larger."""
 
 TETHER_POINTS = 1000
 """Distinguishable points of a payload, 0.1 m apart: prior odds of an attachment at a grasp against any other point."""
@@ -229,48 +210,31 @@ TETHER_POINTS = 1000
 LEVERS = ("lever_x_m", "lever_y_m", "lever_z_m")
 
 
-def _at(lever: Array) -> Shape:
-    return dict(zip(LEVERS, lever.tolist(), strict=True))
+class PayloadTether(Tied):
+    """A tether of any point of the payload, with the anchor fixed in robot 1's {b}.
 
-
-class PayloadTether(Cause):
-    """Force k (anchor - point) on a point of the payload, with the anchor fixed in robot 1's {b}.
-
-    The columns are the force at home and the stiffness. The shape is the point, from the centre of mass in {1}. With
-    ``stretch_m`` in its shape it is a cable, which has a stiffness only, and the shape gives its line at home.
+    The shape is the point, from the centre of mass in {1}, or gives a cable's line at home.
     """
 
     title = "tether of the payload"
-    family = "sea_torque"
-    parameters = ("force_x_N", "force_y_N", "force_z_N", "stiffness_N_per_m")
-    scales = (0.1, 0.1, 0.1, 1.0)
     at = "payload"
     among = TETHER_POINTS
     shapes: ClassVar[tuple[Shape, ...]] = (
         dict.fromkeys(LEVERS, 0.0),
-        *(_at(sign * TETHER_LEVER_M * e) for e in np.eye(3) for sign in (1.0, -1.0)),
+        *(by_axis("lever", "m", sign * TETHER_LEVER_M * e) for e in np.eye(3) for sign in (1.0, -1.0)),
         *(through(np.zeros(3), way) for way in first_ways()),
     )
     determined: ClassVar[Mapping[str, float]] = {**dict.fromkeys(LEVERS, TETHER_STEP_M), **SLOPE_STEPS}
-    positive = ("stiffness_N_per_m",)
-    separate = "A run without payload, or a second payload at the same place, separates an outside force from a sensor."
+    absolute: ClassVar[Collection[str]] = determined
 
     def sentence(self, n):
-        return (
-            f"something like a cable pulls at the payload's point {n.vector('point', 'm')} in {{1}} with "
-            f"{n('stiffness_N_per_m', 'N/m')} towards {n.vector('anchor', 'm')} in robot 1's base frame{slack(n)}"
-        )
+        return self.pulls(n, f"the payload's point {n.vector('point', 'm')} in {{1}}", "robot 1's")
 
-    def columns(self, trial, robot, joint, shape):
+    def attached(self, trial, robot, shape):
         R, p = trial.data.R_bi[:, 0], trial.data.p_bi[:, 0]  # {1} in {b1}
         point = trial.shared.pi[1:4] / trial.shared.pi[0] + _lever(shape)
         moved = p + R @ point - (np.array([0.0, 0.0, trial.design.home_height_m]) + point)
-        if is_cable(shape):
-            forces_b = [pull(shape, moved)]
-        else:
-            forces_b = [*(np.broadcast_to(axis, p.shape) for axis in np.eye(3)), -moved]
-        forces = [np.einsum("qji,qj->qi", R, force_b) for force_b in forces_b]
-        return beside_force([trial.of_wrench(force, np.cross(point, force)) for force in forces])
+        return point, moved
 
     def further(self, shape):
         at = _lever(shape)
@@ -279,34 +243,19 @@ class PayloadTether(Cause):
     def finer(self, shape):
         """Nearby points, within the payload's reach."""
         if is_cable(shape):
-            return otherwise_slack(shape)  # Gauss-Newton steps refine the other numbers
-        moved = [
-            dict(shape) | {name: shape[name] + step}
-            for name in LEVERS
-            for far in TETHER_FINER_M
-            for step in (far, -far)
-        ]
-        return [other for other in moved if np.linalg.norm(_lever(other)) <= SLOSH_REACH_M]
-
-    def grown(self, shape):
-        return strap(shape)
+            return super().finer(shape)  # Gauss-Newton steps refine the other numbers
+        steps = (sign * far for far in TETHER_FINER_M for sign in (1.0, -1.0))
+        moved = [{**shape, name: shape[name] + step} for name, step in product(LEVERS, steps)]
+        return [other for other in moved if np.linalg.norm(_lever(other)) <= REACH_M]
 
     def alike(self, shape):
-        return alike(shape) * CABLE_LINES if is_cable(shape) else self.among
-
-    def slope_step(self, name, number):
-        return self.determined[name]
+        return super().alike(shape) * (CABLE_LINES if is_cable(shape) else 1)
 
     def physical(self, values, context):
         point = context.p_1c + _lever(context.shape)
-        home = np.array([0.0, 0.0, context.home_height_m]) + point
-        return tied(values, context.shape, home) | {
-            f"point_{axis}_m": float(x) for axis, x in zip("xyz", point, strict=True)
-        }
+        return self.tied(values, context, point) | by_axis("point", "m", point)
 
 
 def _lever(shape):
     """Attachment point from the centre of mass, in {1} [m], shape (3,)."""
-    if is_cable(shape):
-        return lever(shape)
-    return np.array([shape[name] for name in LEVERS])
+    return lever(shape) if is_cable(shape) else np.array([shape[name] for name in LEVERS])

@@ -101,7 +101,6 @@ class Friction(Cause):
         moves: signal that shows the joint's motion.
         sign: sign of the error in the torque reading while that signal grows.
         gives: name of the presliding displacement, in units of the signal.
-        gives_range: range of the presliding displacement.
     """
 
     family = "dissipation"
@@ -113,11 +112,11 @@ class Friction(Cause):
         *({"presliding_rad": x} for x in PRESLIDINGS_RAD),
     )  # fmt: skip
     determined: ClassVar[Mapping[str, float]] = {"presliding_rad": 0.1}
+    refined: ClassVar = {"presliding_rad": (PRESLIDING_FINER, PRESLIDING_RANGE_RAD)}
     positive = ("coulomb_Nm",)
     moves: ClassVar[Literal["phi", "theta", "tau"]] = "phi"
     sign: ClassVar[float] = 1.0
     gives: ClassVar[str] = "presliding_rad"
-    gives_range: ClassVar[tuple[float, float]] = PRESLIDING_RANGE_RAD
 
     def sentence(self, n):
         soft = f", after it has given way by {n(self.gives, 'mrad', 1e3)}" if n.values.get(self.gives) else ""
@@ -125,11 +124,6 @@ class Friction(Cause):
             f"the {self.at} rubs with {n('coulomb_Nm', 'N m')} (Coulomb, while it moves{soft}) and "
             f"{n('viscous_Nms_per_rad', 'N m s/rad')} (viscous)"
         )
-
-    def finer(self, shape):
-        least, most = self.gives_range
-        near = (shape[self.gives] * share for share in PRESLIDING_FINER) if self.gives in shape else ()
-        return [{self.gives: x} for x in near if least <= x <= most]
 
     def physical(self, values, context):
         return super().physical(values, context) | {self.gives: context.shape.get(self.gives, 0.0)}
@@ -243,11 +237,11 @@ class SeaHysteresis(Friction):
         {"slow_Nm_per_s": 0.2}, {"slow_Nm_per_s": 0.6}, *({"presliding_Nm": x} for x in PRESLIDINGS_NM)
     )  # fmt: skip
     determined: ClassVar = {"presliding_Nm": 0.1}
+    refined: ClassVar = {"presliding_Nm": (PRESLIDING_FINER, PRESLIDING_RANGE_NM)}
     positive = ("friction_Nm",)
     moves = "tau"
     sign = -1.0
     gives = "presliding_Nm"
-    gives_range = PRESLIDING_RANGE_NM
     separate = (
         "Motion with load reversals at rest separates friction in the spring from friction in the joint."
     )

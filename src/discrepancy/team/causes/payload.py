@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from discrepancy.candidate import Transient
-from discrepancy.team.causes.base import Cause, Shape, stack
+from discrepancy.team.causes.base import Cause, Shape, by_axis, stack
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import ORDER, Array, inertia_matrix, inertia_parameters, point_inertia
 from estimator.rigid_team import balance, fusion_matrix
@@ -39,14 +39,7 @@ class Push(Cause):
     title = "push on the payload"
     family = "push"
     parameters = ("force_x_N", "force_y_N", "force_z_N", "moment_x_Nm", "moment_y_Nm", "moment_z_Nm")
-    tolerances = (
-        0.02,
-        0.02,
-        0.02,
-        0.02,
-        0.02,
-        0.02,
-    )  # friction that settles differently acts like a small push
+    tolerances = (0.02,) * 6  # friction that settles differently acts like a small push
     transient = True
     determined = dict.fromkeys(("start_s", "duration_s", "ramp_s"), 0.25)
     at = "payload"
@@ -75,13 +68,12 @@ class Push(Cause):
     def columns(self, trial, robot, joint, shape):
         window = during(trial, shape)
         none = np.zeros((len(window), 3))
-        columns = []
-        for axis in np.eye(3):
-            force = np.einsum("qji,j->qi", trial.data.R_bi[:, 0], axis) * window[:, None]
-            columns.append(trial.of_wrench(force, none))
-        for axis in np.eye(3):
-            columns.append(trial.of_wrench(none, np.outer(window, axis)))
-        return stack(columns)
+        forces = [
+            trial.of_wrench(along * window[:, None], none)
+            for along in np.moveaxis(trial.data.R_bi[:, 0], 1, 0)
+        ]
+        moments = [trial.of_wrench(none, np.outer(window, axis)) for axis in np.eye(3)]
+        return stack([*forces, *moments])
 
     def physical(self, values, context):
         force, moment = values[:3], values[3:]
@@ -91,9 +83,8 @@ class Push(Cause):
         return (
             {"trial": context.trial or 1, "start_s": context.shape["start_s"]}
             | {"duration_s": context.shape["duration_s"], "ramp_s": context.shape.get("ramp_s", 0.0)}
-            | {f"force_{axis}_N": float(x) for axis, x in zip("xyz", force, strict=True)}
-            | {f"point_{axis}_m": float(x) for axis, x in zip("xyz", point, strict=True)}
-        )
+            | by_axis("force", "N", force) | by_axis("point", "m", point)
+        )  # fmt: skip
 
 
 class Drag(Cause):
@@ -217,7 +208,7 @@ class PayloadMass(Cause):
         return (
             {"mass_kg": 0.0 if over else float(mass), "rate_kgps": float(mass / over) if over else 0.0}
             | {"trial": int(shape.get("trial", 1)), "last_trial": int(shape.get("last_trial", 0))}
-            | {f"point_{axis}_m": float(x) for axis, x in zip("xyz", point, strict=True)}
+            | by_axis("point", "m", point)
             | {f"inertia_{ij}_m2": float(x) for ij, x in zip(INERTIAS, own, strict=True)}
         )
 

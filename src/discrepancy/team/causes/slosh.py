@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
-from discrepancy.team.causes.base import Cause, Shape
+from discrepancy.team.causes.base import REACH_M, Cause, Shape, by_axis
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
 from estimator.so3 import skew
@@ -234,9 +234,6 @@ SLOSH_HEADINGS_RAD = (0.0, 0.79, 1.57, 2.36)
 SLOSH_ACROSS = (0.3, 0.37, 0.46, 0.58, 0.72, 1.38, 1.7, 2.15, 2.7, 3.4)
 """Length across over length along, tried first. Measured: a value that is wrong by 25 % still helps."""
 
-SLOSH_REACH_M = 1.5
-"""Largest distance from the centre of mass to the pivot. Chosen: no payload of three robots is larger."""
-
 SLOSH_MOST_DAMPED = 0.3
 """Largest damping ratio tried. Chosen."""
 
@@ -280,6 +277,7 @@ class Slosh(Cause):
         "second_length_m": 0.05,
         "second_share": 0.1,
     }
+    absolute = ("heading_rad",)
     separate = "Motion near the pendulum's own frequency."
 
     def sentence(self, n):
@@ -323,7 +321,7 @@ class Slosh(Cause):
 
     def around(self, values, shape):
         """Compute the columns at the pivot that the values indicate."""
-        at = np.clip(values[1:] / max(values[0], 1e-6), -SLOSH_REACH_M, SLOSH_REACH_M)
+        at = np.clip(values[1:] / max(values[0], 1e-6), -REACH_M, REACH_M)
         return {**shape, **dict(zip(OFF, at.tolist(), strict=True))}
 
     def finer(self, shape):
@@ -344,17 +342,12 @@ class Slosh(Cause):
     def alike(self, shape):
         return SLOSH_SECONDS if _has_two(shape) else self.among
 
-    def slope_step(self, name, number):
-        return self.determined[name] if name == "heading_rad" else super().slope_step(name, number)
-
     def physical(self, values, context):
         mass = values[0] if abs(values[0]) > 1e-6 else 1e-6
         point = context.p_1c + values[1:] / mass
         plain = {"across_length_m": 0.0, "heading_rad": 0.0, "second_length_m": 0.0, "second_share": 0.0}
         told = {name: x for name, x in context.shape.items() if name not in OFF}
-        return {"mass_kg": float(mass), **plain, **told} | {
-            f"point_{axis}_m": float(x) for axis, x in zip("xyz", point, strict=True)
-        }
+        return {"mass_kg": float(mass), **plain, **told, **by_axis("point", "m", point)}
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,11 +39,7 @@ class Yielding(Cause):
     positive = ("compliance_m_per_N",)
     shapes = tuple({"relaxation_s": time_s} for time_s in RELAXATIONS_S)
     determined: ClassVar = {"relaxation_s": 0.1}
-
-    def finer(self, shape):
-        times_s = [shape["relaxation_s"] * share for share in RELAXATION_FINER]
-        least_s, most_s = RELAXATION_RANGE_S
-        return [{"relaxation_s": time_s} for time_s in times_s if least_s <= time_s <= most_s]
+    refined: ClassVar = {"relaxation_s": (RELAXATION_FINER, RELAXATION_RANGE_S)}
 
     def physical(self, values, context):
         return {"compliance_m_per_N": float(values[0]), **context.shape}
@@ -72,6 +68,7 @@ class BaseCompliance(Yielding):
     title = "compliance of {base}"
     at = "robot"
     determined: ClassVar = {**Yielding.determined, "inertia_s2": 0.1}
+    refined: ClassVar = {**Yielding.refined, "inertia_s2": (BASE_INERTIA_FINER, (0.0, math.inf))}
     separate = (
         "Vertical forces (lifting against each other) separate a base, which yields sideways, from a grasp."
     )
@@ -82,13 +79,6 @@ class BaseCompliance(Yielding):
             f"the base gives way horizontally, by {n('compliance_m_per_N', 'um/N', 1e6)}, and follows the force within "
             f"{n('relaxation_s', 'ms', 1e3)}{along}"
         )
-
-    def finer(self, shape):
-        times = super().finer(shape)
-        if "inertia_s2" not in shape:
-            return times
-        inertias = (shape["inertia_s2"] * share for share in BASE_INERTIA_FINER)
-        return [*({**shape, **time} for time in times), *({**shape, "inertia_s2": x} for x in inertias)]
 
     def further(self, shape):
         """Add the robot's mass to the spring; slow forces have the same lag."""
@@ -132,6 +122,7 @@ class BaseCreep(Cause):
     tolerances = (2e-8, 2e-8)
     at = "robot"
     determined: ClassVar = {"start_s": CREEP_STEP_S}
+    absolute = ("start_s",)
     separate = "A longer recording at rest."
 
     def sentence(self, n):
@@ -151,9 +142,6 @@ class BaseCreep(Cause):
     def alike(self, shape):
         return CREEP_STARTS if shape else self.among
 
-    def slope_step(self, name, number):
-        return self.determined[name]
-
     def physical(self, values, context):
         return super().physical(values, context) | {"start_s": context.shape.get("start_s", 0.0)}
 
@@ -161,12 +149,8 @@ class BaseCreep(Cause):
         # Count from the start of the recording, even in a later part. The base poses absorb a constant.
         since = shape.get("start_s", trial.signals.time[0])
         time = np.maximum(0.0, trial.signals.time - since)
-        return stack(
-            [
-                trial.of_pose(robot, None, np.outer(time, trial.bases.R[robot] @ np.eye(3)[k]))
-                for k in range(2)
-            ]
-        )
+        axes = trial.bases.R[robot].T[:2]
+        return stack([trial.of_pose(robot, None, np.outer(time, axis)) for axis in axes])
 
 
 GRASP_TURNS_FINER, GRASP_TURNS_RANGE_M = (0.5, 0.7, 1.4, 2.0), (0.01, 0.3)
@@ -195,6 +179,7 @@ class GraspFlex(Yielding):
         *({"relaxation_s": min(RELAXATIONS_S), "offset_m": offset_m} for offset_m in GRASP_TURNS_M),
     )
     determined: ClassVar = {**Yielding.determined, "offset_m": 0.1}
+    refined: ClassVar = {**Yielding.refined, "offset_m": (GRASP_TURNS_FINER, GRASP_TURNS_RANGE_M)}
     separate = (
         "Vertical forces (lifting against each other) separate a grasp from a base, which yields sideways."
     )
@@ -208,15 +193,6 @@ class GraspFlex(Yielding):
         return (
             f"the grasp is flexible: it {gives}, and follows the force within {n('relaxation_s', 'ms', 1e3)}"
         )
-
-    def finer(self, shape):
-        times = super().finer(shape)
-        if "offset_m" not in shape:
-            return times
-        least_m, most_m = GRASP_TURNS_RANGE_M
-        offsets_m = (shape["offset_m"] * share for share in GRASP_TURNS_FINER)
-        near = [{**shape, "offset_m": x} for x in offsets_m if least_m <= abs(x) <= most_m]
-        return [*({**shape, **time} for time in times), *near]
 
     def columns(self, trial, robot, joint, shape):
         R_bi, to_b1 = trial.data.R_bi[:, robot], trial.bases.R[robot]
@@ -272,6 +248,7 @@ class GraspPlay(Cause):
     at = "grasp"
     shapes = ({"force_N": PLAY_FORCE_N}, {"force_N": PLAY_FORCE_N, "contact_per_N": 0.0})
     determined: ClassVar = {"contact_per_N": PLAY_CONTACT_PER_N}
+    absolute = ("contact_per_N",)
     positive = ("play_m",)
     separate = "Internal forces of both signs at rest separate play from flexibility."
 
@@ -280,9 +257,6 @@ class GraspPlay(Cause):
         if n.values.get("contact_m_per_N"):
             behind = f", and gives way by {n('contact_m_per_N', 'nm/N', 1e9)} behind"
         return f"the grasp is loose by +-({n('play_m', 'um', 1e6)}) along each axis{behind}"
-
-    def slope_step(self, name, number):
-        return self.determined[name]  # absolute, because the number starts at zero
 
     def physical(self, values, context):
         play_m = float(values[0])
