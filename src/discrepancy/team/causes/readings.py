@@ -127,8 +127,8 @@ def _way_behind(reading: Array, rate_hz: float) -> tuple[Array, NDArray[np.bool_
     """Place of a joint in the play of its encoder by the readings, -1 to 1, and where that is open, shape (Q,) each.
 
     It is that of the last motion. After a turn the reading stands still while the joint crosses the play, with constant
-    acceleration. Before the first motion the encoder is amid its play. A joint that turns twice while its reading stands
-    still leaves no trace there, so every longer stop of the reading is open.
+    acceleration. Before the first motion the encoder is amid its play. A joint may turn twice
+    while its reading stands still, so every longer stop of the reading is open.
     """
     sign = np.sign(np.diff(played(reading, PLAY_STEP_RAD), prepend=reading[0]))
     moves = np.flatnonzero(sign)
