@@ -209,7 +209,7 @@ def placed(problem: TeamProblem, other: TeamProblem, chosen: Sequence[Chosen]) -
     return out
 
 
-LEAVE_OPEN = ("joint_friction", "gimbal_friction", "sea_hysteresis", "grasp_play")
+LEAVE_OPEN = ("joint_friction", "gimbal_friction", "sea_hysteresis", "grasp_play", "encoder_play")
 """Causes that change the noise of the rows. The search must continue with that noise."""
 
 

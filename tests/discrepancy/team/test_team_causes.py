@@ -305,6 +305,29 @@ def test_friction_at_rest_takes_any_force_that_passes_the_filter(case):
         assert np.linalg.norm(left) < 0.15 * np.linalg.norm(expected)
 
 
+def test_a_joint_that_turns_twice_in_the_play_of_its_encoder_leaves_its_place_open(case):
+    """While the reading stands still, the joint crosses the play and comes back; elsewhere the law is right."""
+    s, half, (start, stop) = case.signals, 1.5e-3, (700, 780)
+    time = np.arange(len(s.time)) / RATE
+    angle = 0.1 * np.sin(time)
+    angle[stop:] += angle[start] - angle[stop]
+    angle[start:stop] = angle[start] - 1.8 * half * np.sin(np.linspace(0.0, np.pi, stop - start)) ** 2
+    loose = [angle[0]]
+    for x in angle[1:]:
+        loose.append(min(max(loose[-1], x - half), x + half))
+    read = replace(s, theta=put(s.theta, 1, with_joint(s.theta[:, 1], 2, np.array(loose))))
+    linear, cause = replace(case.linear, signals=read), CAUSES["encoder_play"]
+    (law,) = cause.errors(read, 1, 2, {}, DESIGN)
+    beyond = np.array(loose) - angle - 2.0 * half * law["theta"][:, 2]
+    expected = case.linear.of_signals(1, theta=np.outer(beyond, [0.0, 0.0, 1.0])).ravel()
+    unknowns = dense(cause.unknowns(linear, 1, 2, {}))
+    added = unknowns.reshape(-1, unknowns.shape[2])
+    left = expected - added @ np.linalg.lstsq(added, expected, rcond=None)[0]
+    assert np.abs(beyond).max() > 1.7 * half
+    assert np.linalg.norm(left) < 0.15 * np.linalg.norm(expected)
+    assert unknowns.shape[2] < 0.3 * len(time) / RATE / 0.05  # knots everywhere would be three times as many
+
+
 def team_of(case, robots):
     """A team of any size from the robots at hand; it need not be in balance."""
     which = [(0, 1, 2, 1, 2)[k] for k in range(robots)]

@@ -5,10 +5,12 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from discrepancy.team.causes.base import Cause, ReadingError, one_joint, one_robot, stack
-from discrepancy.team.causes.friction import played
+from discrepancy.team.causes.friction import in_parts, pieces_while, played
+from discrepancy.team.linear.rows import PATCH_COLUMNS
 from estimator.arm.delta import LEG_DIRECTIONS, jacobian_of, leg_geometry
 from estimator.arm.motion import PHI
 from estimator.arm.unit import ArmUnit, design_of
@@ -84,6 +86,12 @@ class ThetaZero(ReadingError):
 PLAY_STEP_RAD, CROSSING_S = 1e-4, 0.3
 """Change of a reading that is more than noise [rad], and longest time in which a joint crosses the play [s]. Chosen: a
 step of a 16-bit encoder; commanded motion turns round by 5 mrad in a quarter of a second."""
+STANDS_S, BESIDE_S, STANDING_KNOTS_S = 0.1, 0.05, 0.05
+"""Time in which a joint may leave its side of the play and come back, time beside a stop of the reading, and between
+knots of what it leaves open [s]. Chosen: the reading's last step comes up to 20 ms before the turn."""
+STANDING_OPEN = 1.0 / np.sqrt(3.0)
+"""Standard deviation of a joint's place while its reading stands still, over half the play. Derived: any place in the
+play is as likely."""
 
 
 class EncoderPlay(ReadingError):
@@ -104,25 +112,38 @@ class EncoderPlay(ReadingError):
         return f"the encoder of the gimbal joint has {n('play_rad', 'mrad', 1e3)} of play"
 
     def errors(self, signals, robot, joint, shape, arm):
-        way = _way_behind(signals.theta[:, robot, joint], signals.rate_hz)
+        way, _ = _way_behind(signals.theta[:, robot, joint], signals.rate_hz)
         return [{"theta": one_joint(-0.5 * way, joint)}]
 
+    def unknowns(self, trial, robot, joint, shape):
+        """While the reading stands still, the joint may be anywhere in the play."""
+        rate_hz = trial.signals.rate_hz
+        _, stands = _way_behind(trial.signals.theta[:, robot, joint], rate_hz)
+        pieces = in_parts(pieces_while(stands, rate_hz, STANDING_KNOTS_S), PATCH_COLUMNS)
+        return trial.of_misreadings(robot, joint, ((at, 0.5 * STANDING_OPEN * x) for at, x in pieces))
 
-def _way_behind(reading: Array, rate_hz: float) -> Array:
-    """Place of a joint in the play of its encoder by the readings, -1 to 1, shape (Q,).
+
+def _way_behind(reading: Array, rate_hz: float) -> tuple[Array, NDArray[np.bool_]]:
+    """Place of a joint in the play of its encoder by the readings, -1 to 1, and where that is open, shape (Q,) each.
 
     It is that of the last motion. After a turn the reading stands still while the joint crosses the play, with constant
-    acceleration. Before the first motion the encoder is amid its play.
+    acceleration. Before the first motion the encoder is amid its play. A joint may turn twice
+    while its reading stands still, so every longer stop of the reading is open.
     """
     sign = np.sign(np.diff(played(reading, PLAY_STEP_RAD), prepend=reading[0]))
     moves = np.flatnonzero(sign)
-    way, before = np.zeros(len(reading)), 0.0
-    for k in np.flatnonzero(np.diff(sign[moves], prepend=0.0)):
+    way, open_, before = np.zeros(len(reading)), np.zeros(len(reading), dtype=bool), 0.0
+    beside = round(BESIDE_S * rate_hz)
+    ends = np.concatenate([[0], moves, [len(reading)]])
+    turns = np.diff(sign[moves], prepend=0.0) != 0.0
+    for k in np.flatnonzero((np.diff(ends) > STANDS_S * rate_hz) | np.append(turns, False)):
+        open_[max(0, ends[k] - beside) : ends[k + 1] + beside] = True
+    for k in np.flatnonzero(turns):
         now, after = moves[k], sign[moves[k]]
         start = max(0 if not k else moves[k - 1], now - round(CROSSING_S * rate_hz))
         way[start:now] = before + (after - before) * np.linspace(0.0, 1.0, now - start, endpoint=False) ** 2
         way[now:], before = after, after
-    return way
+    return way, open_
 
 
 class SeaScale(ReadingError):

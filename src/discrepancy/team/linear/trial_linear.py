@@ -314,6 +314,25 @@ class TrialLinear:
 
         return self.reduction.of_blocks(blocks(), self.channels)
 
+    def of_misreadings(self, robot: int, joint: int, pieces: Iterable[tuple[slice, Array]]) -> Patches:
+        """Residual rows caused by errors of one gimbal angle that last for an interval each.
+
+        Args:
+            robot, joint: indices from 0.
+            pieces: samples of each interval, and k columns of reading minus truth there [rad], shape (s, k).
+        """
+        reach, slots = math.ceil(SHIFT_REACH_S * self.signals.rate_hz), with_its_rates(THETA)
+
+        def blocks() -> Iterator[tuple[slice, Array]]:
+            for at, values in pieces:
+                near = slice(max(at.start - reach, 0), min(at.stop + reach, len(self.s)))
+                error = np.zeros((near.stop - near.start, values.shape[1]))
+                error[at.start - near.start : at.stop - near.start] = values
+                J = self.J.at(robot, slots, np.arange(near.start, near.stop))[:, :, joint::3]
+                yield near, np.einsum("scr,rsk->sck", J, self.signals.with_rates(error))
+
+        return self.reduction.of_blocks(blocks(), self.channels)
+
     def _displaced(self, robot: int, displacement: Array, at: slice) -> Array:
         """Residual samples (s, C, k) caused by displacements (s, 3, k) [m] in {b1}, for the samples ``at``."""
         out = np.zeros((len(displacement), self.channels, displacement.shape[2]))
