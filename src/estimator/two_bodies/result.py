@@ -7,6 +7,7 @@ payload, robots            label or null; N
 kind, motion               "hinged", "sliding" or "flexible"; "hinged" or "sliding"
 halves                     numbers of the robots that hold body A (robot 1 is of them) and body B
 joint                      axis_1 [3], axis_se_deg, pivot_1_m [3] and pivot_se_m (null if sliding)
+    covariance             of turns of the axis about y and z [rad] and, with a hinge, shifts of the pivot along them [m]
     axes_1                 columns (axis, y, z) in {1}, 3 x 3
     zero                   {p_1k_m, R_1k_rotvec_deg}: pose of {k}, the grasp of B's first robot, at q = 0
     q_low, q_high, q_rms   [u]
@@ -86,7 +87,8 @@ class TwoBodies:
         kind: "flexible" if the joint has a spring, else ``motion``.
         halves: robots (from 1) of bodies A and B.
         axes: the joint's axis and two normals in {1}, as columns, shape (3, 3).
-        axis_se_rad, pivot_se_m: standard errors of the axis' direction, and of the pivot across it.
+        joint_covariance: of turns of the axis about its two normals [rad] and, with a hinge, shifts of the pivot along
+            them [m], shape (2, 2) or (4, 4).
         pivot: point on a hinge's axis in {1} [m], or None.
         R_0, p_0: pose of {k} in {1} at q = 0; {k} is the grasp frame of the first robot of B.
         R_ki, p_ki: grasps in the frame of their body, shapes (N, 3, 3) and (N, 3).
@@ -104,9 +106,8 @@ class TwoBodies:
     motion: Motion
     halves: tuple[tuple[int, ...], tuple[int, ...]]
     axes: Array
-    axis_se_rad: float
     pivot: Array | None
-    pivot_se_m: float | None
+    joint_covariance: Array
     R_0: Array
     p_0: Array
     R_ki: Array
@@ -122,6 +123,16 @@ class TwoBodies:
     undetermined: tuple[WeakDirection, ...]
     flags: tuple[str, ...]
     why: str = ""
+
+    @property
+    def axis_se_rad(self) -> float:
+        """Standard error of the direction of the axis."""
+        return float(np.sqrt(np.trace(self.joint_covariance[:2, :2])))
+
+    @property
+    def pivot_se_m(self) -> float | None:
+        """Standard error of the pivot across the axis; None for a slide."""
+        return None if self.pivot is None else float(np.sqrt(np.trace(self.joint_covariance[2:, 2:])))
 
     @property
     def joint(self) -> Joint:
@@ -145,25 +156,23 @@ class TwoBodies:
         n = 10 + len(NAMES[self.motion])
         return pseudo_inertia(parameters[:10]), pseudo_inertia(expand(self.motion) @ parameters[10:n])
 
-    def _at_zero(self) -> Array:
-        """Transform from {J} at q = 0 to {1}."""
+    def _at_zero(self, q: float = 0.0) -> Array:
+        """Transform from {J} at q to {1}."""
         T = np.eye(4)
-        T[:3, :3], T[:3, 3] = self.joint.at(0.0)
+        T[:3, :3], T[:3, 3] = self.joint.at(q)
         return T
 
     @property
     def whole(self) -> tuple[Body, Array]:
         """Both bodies with the joint at zero, and standard errors of (m, centre of mass, six moments), shape (10,)."""
         T = self._at_zero()
-
-        def numbers(parameters: Array) -> Array:
-            P_A, P_B = self._pseudo(parameters)
-            m, c, inertia = body_of(P_A + T @ P_B @ T.T)
-            return np.array([m, *c, *inertia_parameters(inertia)])
-
-        J = numerical_jacobian(numbers, self.parameters)
         P_A, P_B = self._pseudo(self.parameters)
-        return Body(*body_of(P_A + T @ P_B @ T.T)), standard_errors(J @ self.covariance @ J.T)
+        return Body(*body_of(P_A + T @ P_B @ T.T)), standard_errors(self.whole_at(0.0)[1])
+
+    def whole_at(self, q: float) -> tuple[Array, Array]:
+        """Return (m, centre of mass, six moments about it) in {1} with the joint at q, and their covariance."""
+        J = numerical_jacobian(lambda x: _whole_of(self, x, q), self.parameters)
+        return _whole_of(self, self.parameters, q), J @ self.covariance @ J.T
 
     @property
     def bodies(self) -> tuple[Body, Body, tuple[float, float]] | None:
@@ -227,6 +236,7 @@ class TwoBodies:
                 "axis_se_deg": float(np.rad2deg(self.axis_se_rad)),
                 "pivot_1_m": None if self.pivot is None else self.pivot.tolist(),
                 "pivot_se_m": self.pivot_se_m,
+                "covariance": self.joint_covariance.tolist(),
                 "axes_1": self.axes.tolist(),
                 "zero": {"p_1k_m": self.p_0.tolist(), "R_1k_rotvec_deg": _rotvec_deg(self.R_0)},
                 "q_low": self.q_low,
@@ -286,9 +296,8 @@ class TwoBodies:
                 **{key: values[key] for key in ("payload", "robots", "kind", "motion", "why")},
                 halves=_halves(values["halves"]),
                 axes=np.array(joint["axes_1"]),
-                axis_se_rad=float(np.deg2rad(joint["axis_se_deg"])),
                 pivot=None if pivot is None else np.array(pivot),
-                pivot_se_m=joint["pivot_se_m"],
+                joint_covariance=np.array(joint["covariance"]),
                 R_0=_matrix(zero["R_1k_rotvec_deg"]),
                 p_0=np.array(zero["p_1k_m"]),
                 R_ki=np.array([_matrix(one["R_ki_rotvec_deg"]) for one in grasps]),
@@ -434,9 +443,9 @@ def format_two_bodies(found: TwoBodies, truth: dict[str, Any] | None = None) -> 
     return "\n".join(lines)
 
 
-def _whole_of(found: TwoBodies, parameters: Array) -> Array:
+def _whole_of(found: TwoBodies, parameters: Array, q: float = 0.0) -> Array:
     P_A, P_B = found._pseudo(parameters)
-    T = found._at_zero()
+    T = found._at_zero(q)
     m, c, inertia = body_of(P_A + T @ P_B @ T.T)
     return np.array([m, *c, *inertia_parameters(inertia)])
 
