@@ -7,7 +7,7 @@ payload, robots            label or null; N
 kind, motion               "hinged", "sliding" or "flexible"; "hinged" or "sliding"
 halves                     numbers of the robots that hold body A (robot 1 is of them) and body B
 joint                      axis_1 [3], axis_se_deg, pivot_1_m [3] and pivot_se_m (null if sliding)
-    covariance             of turns of the axis about y and z [rad] and, with a hinge, shifts of the pivot along them [m]
+    covariance             of turns of the axis about y and z [rad] and, with a hinge, shifts of the pivot [m]
     axes_1                 columns (axis, y, z) in {1}, 3 x 3
     zero                   {p_1k_m, R_1k_rotvec_deg}: pose of {k}, the grasp of B's first robot, at q = 0
     q_low, q_high, q_rms   [u]
@@ -37,9 +37,10 @@ from scipy.spatial.transform import Rotation
 from estimator.arrays import Array, inertia_parameters
 from estimator.errors import InputError
 from estimator.estimate.uncertainty import WeakDirection, numerical_jacobian, standard_errors
+from estimator.rigid_team import Bases
 from estimator.statistics import measured
 from estimator.two_bodies.split import body_of, hidden, pseudo_inertia, split
-from estimator.two_bodies.team import NAMES, Joint, Motion, expand
+from estimator.two_bodies.team import NAMES, Joint, Motion, Pair, expand
 
 FORMAT, VERSION = "mocobot-two-bodies", 1
 
@@ -141,6 +142,11 @@ class TwoBodies:
             self.motion, self.R_0, self.p_0, self.axes, np.zeros(3) if self.pivot is None else self.pivot
         )
 
+    def pair(self, bases: tuple[Bases, ...]) -> Pair:
+        """Grasps and joint as the equations use them, with the bases of trials."""
+        first, second = (tuple(i - 1 for i in half) for half in self.halves)
+        return Pair((first, second), self.R_ki, self.p_ki, self.joint, bases)
+
     @property
     def names(self) -> tuple[str, ...]:
         """Names of ``parameters``."""
@@ -170,9 +176,16 @@ class TwoBodies:
         return Body(*body_of(P_A + T @ P_B @ T.T)), standard_errors(self.whole_at(0.0)[1])
 
     def whole_at(self, q: float) -> tuple[Array, Array]:
-        """Return (m, centre of mass, six moments about it) in {1} with the joint at q, and their covariance."""
-        J = numerical_jacobian(lambda x: _whole_of(self, x, q), self.parameters)
-        return _whole_of(self, self.parameters, q), J @ self.covariance @ J.T
+        """Return ``whole_of`` the estimate with the joint at q, and its covariance."""
+        J = numerical_jacobian(lambda x: self.whole_of(x, q), self.parameters)
+        return self.whole_of(self.parameters, q), J @ self.covariance @ J.T
+
+    def whole_of(self, parameters: Array, q: float = 0.0) -> Array:
+        """Return (m, centre of mass, six moments about it) in {1} of parameters in this estimate's frames."""
+        P_A, P_B = self._pseudo(parameters)
+        T = self._at_zero(q)
+        m, c, inertia = body_of(P_A + T @ P_B @ T.T)
+        return np.array([m, *c, *inertia_parameters(inertia)])
 
     @property
     def bodies(self) -> tuple[Body, Body, tuple[float, float]] | None:
@@ -205,18 +218,29 @@ class TwoBodies:
         ten_A, ten_B = _ten(A + G_A @ Z @ G_A.T), _ten(P - G_B @ Z @ G_B.T)
         values = {key.split("_N")[0]: value for key, value in told.items() if isinstance(value, float)}
         rest = told.get("rest_rad", told.get("rest_m", 0.0))
-        k = truth["bodies"][1]["robots"][0] - 1
-        zero = truth["grasps"][k]
-        R = Rotation.from_rotvec(zero["R_1i_rotvec_deg"], degrees=True).as_matrix()
-        q = joint.coordinates(R[None], np.array([zero["p_1i_m"]]))[0][0]
+        q = self._true_zero(truth)
         terms = {
             "damping": values.get("damping", 0.0),
             "friction": 0.0,
             "stiffness": values.get("stiffness", 0.0),
-            "offset": values.get("stiffness", 0.0) * (rest + q),
+            "offset": values.get("stiffness", 0.0)
+            * (np.sign(self.axes[:, 0] @ np.array(told["axis_1"])) * rest + q),
         }
         own = np.linalg.pinv(expand(self.motion)) @ ten_B
         return np.array([*ten_A, *own, *(terms[term] for term in self.law)])
+
+    def _true_zero(self, truth: dict[str, Any]) -> float:
+        """Return the coordinate at which the true joint has its zero."""
+        zero = truth["grasps"][truth["bodies"][1]["robots"][0] - 1]
+        R = Rotation.from_rotvec(zero["R_1i_rotvec_deg"], degrees=True).as_matrix()
+        return float(self.joint.coordinates(R[None], np.array([zero["p_1i_m"]])).q[0])
+
+    def true_position(self, truth: dict[str, Any]) -> Array | None:
+        """Return the true joint position in every row [rad, m], along this estimate's axis and from its zero."""
+        told = truth["joint"]
+        q = told.get("position_rad", told.get("position_m"))
+        sign = np.sign(self.axes[:, 0] @ np.array(told["axis_1"]))
+        return None if q is None else sign * np.array(q) + self._true_zero(truth)
 
     def to_dict(self) -> dict[str, Any]:
         """Convert to the format documented in this module."""
@@ -398,7 +422,7 @@ def format_two_bodies(found: TwoBodies, truth: dict[str, Any] | None = None) -> 
         lines.append("    friction:       none seen")
     whole, se = found.whole
     lines += ["[[Both bodies, joint at zero]]"]
-    known = None if true is None else _whole_of(found, true)
+    known = None if true is None else found.whole_of(true)
     names = ("m", "p_1c x", "p_1c y", "p_1c z", "Ixx", "Iyy", "Izz")
     values = np.array([whole.mass, *whole.com, *inertia_parameters(whole.inertia)])
     for name, k in zip(names, (0, 1, 2, 3, 4, 7, 9), strict=True):
@@ -441,13 +465,6 @@ def format_two_bodies(found: TwoBodies, truth: dict[str, Any] | None = None) -> 
     if found.flags:
         lines += ["[[Flags]]"] + [f"    {flag}" for flag in found.flags]
     return "\n".join(lines)
-
-
-def _whole_of(found: TwoBodies, parameters: Array, q: float = 0.0) -> Array:
-    P_A, P_B = found._pseudo(parameters)
-    T = found._at_zero(q)
-    m, c, inertia = body_of(P_A + T @ P_B @ T.T)
-    return np.array([m, *c, *inertia_parameters(inertia)])
 
 
 def _axis_error(found: TwoBodies, truth: dict[str, Any] | None) -> tuple[str, str]:

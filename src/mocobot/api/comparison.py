@@ -57,7 +57,8 @@ class Comparison(Folder):
     """Differences between two results of one kind; prints as text and writes a folder.
 
     Attributes:
-        kind: ``"estimate"``, ``"estimate of two bodies"``, ``"calibration"``, ``"joint calibration"`` or ``"diagnosis"``.
+        kind: ``"estimate"``, ``"estimate of two bodies"``, ``"calibration"``, ``"joint calibration"`` or
+            ``"diagnosis"``.
         a, b: names of the results.
         groups: quantities that both results contain, with their differences.
         changes: findings that only one result has or that differ, one sentence each.
