@@ -11,7 +11,7 @@ from estimator.errors import InputError
 from estimator.estimate.inertia import PARAMETERS
 from estimator.strict import read_json
 from estimator.two_bodies.result import ABOUT_AXIS, UNITS, TwoBodies
-from mocobot_report.charts import Chart, Key, Line, Panel, points_of_each, stacked_chart, thinned
+from mocobot_report.charts import Key, Line, Panel, points_of_each, stacked_chart, thinned
 from mocobot_report.folder import Result, Source, sources
 from mocobot_report.numbers import counted, kinds_of, plain, spelled, with_error
 from mocobot_report.tables import Entry, Num, measurement, quantity, value
@@ -38,8 +38,14 @@ def context(result: Result, say: Callable[[str], object]) -> dict[str, Any]:
         "title": f"{name} of two bodies, estimated from {counted(len(e.recordings), 'recording')}",
         "e": e, "kinds": kinds_of([r.trial for r in e.recordings]), "division": divided(e.halves), "tiles": _tiles(e),
         "head": (*HEAD, "truth") if truth else HEAD, "truth_name": truth_name, "tables": _tables(e, truth),
-        "bodies": _bodies(e), "range": None if e.bodies is None else [plain(m, 2) for m in e.bodies[2]],
-        "explained": _explained(e), "recordings": _recordings(e), "weak": [str(weak) for weak in e.undetermined],
+        "bodies": [[f"held by {' '.join(map(str, half))}", value(one.mass, 4), _vector(1e3 * one.com),
+                    _vector(np.diag(one.inertia))] for half, one in zip(e.halves, (e.bodies or ())[:2], strict=False)],
+        "range": None if e.bodies is None else [plain(m, 2) for m in e.bodies[2]],
+        "explained": [[one.motion, divided(one.halves), value(one.log_evidence - e.explained[0].log_evidence, 3),
+                       value(one.noise, 3)] for one in e.explained],
+        "recordings": [[r.name, r.trial, Num(f"{r.duration_s:.1f}"), value(r.loops_chi2_n, 3),
+                        value(r.balance_chi2_n, 3)] for r in e.recordings],
+        "weak": [str(weak) for weak in e.undetermined],
         "motion": _motion(found, e, say), "pictures": [],
     }  # fmt: skip
 
@@ -100,31 +106,6 @@ def _tables(e: TwoBodies, truth: dict[str, Any] | None) -> tuple[Rows, Rows, Row
     return terms, both, second
 
 
-def _bodies(e: TwoBodies) -> Rows:
-    if e.bodies is None:
-        return []
-    return [
-        [f"held by {' '.join(map(str, half))}", value(one.mass, 4), _vector(1e3 * one.com), _vector(np.diag(one.inertia))]
-        for half, one in zip(e.halves, e.bodies[:2], strict=True)
-    ]  # fmt: skip
-
-
-def _explained(e: TwoBodies) -> Rows:
-    best = e.explained[0].log_evidence
-    return [
-        ["one rigid body" if one.motion == "rigid" else one.motion, "" if one.motion == "rigid" else divided(one.halves),
-         value(one.log_evidence - best, 3), value(one.noise, 3)]
-        for one in e.explained
-    ]  # fmt: skip
-
-
-def _recordings(e: TwoBodies) -> Rows:
-    return [
-        [r.name, r.trial, Num(f"{r.duration_s:.1f}"), value(r.loops_chi2_n, 3), value(r.balance_chi2_n, 3)]
-        for r in e.recordings
-    ]
-
-
 def _motion(found: Sequence[Source], e: TwoBodies, say: Callable[[str], object]) -> dict[str, Any]:
     """Chart the joint and the gaps at the grasps of every recording that still exists; list what is missing."""
     charts, names, missing = [], [], []
@@ -152,7 +133,9 @@ def _motion(found: Sequence[Source], e: TwoBodies, say: Callable[[str], object])
             Panel("joint", unit, lines),
             Panel("grasps apart", "mm", [Line(GAPS, *_one(trial.time, gap, most))]),
         ]
-        charts.append(_chart(source.name, panels, [*keys, GAPS]))
+        title = "Position of the joint, and distance between flanges and grasps"
+        label = f"{title}, over time, {source.name}."
+        charts.append(stacked_chart(title, label, panels, keys=[*keys, GAPS]))
         names.append(source.name)
     return {"charts": charts, "names": names, "missing": missing}
 
@@ -160,8 +143,3 @@ def _motion(found: Sequence[Source], e: TwoBodies, say: Callable[[str], object])
 def _one(time: Array, values: Array, most: int) -> tuple[Array, Array]:
     time, values = thinned(time, values[:, None], most=most)
     return time, values[:, 0]
-
-
-def _chart(name: str, panels: Sequence[Panel], keys: Sequence[Key]) -> Chart:
-    title = "Position of the joint, and distance between flanges and grasps"
-    return stacked_chart(title, f"{title}, over time, {name}.", panels, keys=keys)

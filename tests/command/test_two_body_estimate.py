@@ -96,3 +96,29 @@ def test_another_joint_has_no_common_numbers(estimates, tmp_path):
     assert found.changed
     assert not found.groups
     assert "robots 1 | 2 3 in A, and hinged between robots 1 2 | 3 in B" in found.changes[0]
+
+
+def test_the_report_shows_joint_bodies_and_truth(door, capsys, tmp_path):
+    folder = tmp_path / "results"
+    folder.mkdir()
+    assert run(capsys, "estimate", door, "--payload", "hinged", "--out", folder / "door.json")[0] == 0
+    code, _, err = run(capsys, "report", folder)
+    assert (code, err) == (0, "")
+    page = (folder / "report.html").read_text()
+    found = mocobot.read_estimate(folder / "door.json")
+    text = re.sub(r"<[^>]*>", "", page)
+    assert "Payload of two bodies, estimated from 1 recording" in text
+    assert "Robots 1 | 2 3 hold" in text
+    assert f"({', '.join(f'{x:.4g}' for x in found.axes[:, 0])})".replace("-", "\u2212") in text
+    assert re.search(r"mass\s*kg\s*10\.\d+\s*± 0\.000\d+\s*10\.500\s", text)
+    assert page.count('class="plot"') == 1
+
+
+def test_a_broken_estimate_is_refused(estimates, capsys, tmp_path):
+    values = json.loads(estimates[0].read_text())
+    del values["joint"]["covariance"]
+    (tmp_path / "door.json").write_text(json.dumps(values))
+    assert "door.json: not a complete estimate of two bodies" in refused(capsys, "report", tmp_path)
+    assert "not a complete estimate of two bodies" in refused(
+        capsys, "compare", tmp_path / "door.json", estimates[0]
+    )
