@@ -87,13 +87,13 @@ def draw(kind: str, rng: np.random.Generator) -> Drawn:
     def body(half: tuple[int, ...], at: np.ndarray) -> str:
         com = at + rng.uniform(-0.1, 0.1, 3) * [1.0, 1.0, 0.4] + [0.0, 0.0, z] - shift
         m, (a, b, c) = rng.uniform(2.5, 6.5), rng.uniform(0.15, 0.35, 3)  # a box of these half sides
-        I = m / 3.0 * np.array([b * b + 0.1 * c * c, a * a + 0.1 * c * c, a * a + b * b])
+        moments = m / 3.0 * np.array([b * b + 0.1 * c * c, a * a + 0.1 * c * c, a * a + b * b])
         sites = []
         for i in half:
             turn = 0.0 if i == 0 else rng.uniform(-np.pi, np.pi)
             quat = f"{np.cos(turn / 2)} 0 0 {np.sin(turn / 2)}"
             sites.append(f'<site name="grasp{i + 1}" pos="{_row(places[i] - shift)}" quat="{quat}"/>')
-        return f'<inertial pos="{_row(com)}" mass="{m}" diaginertia="{_row(I)}"/>' + "".join(sites)
+        return f'<inertial pos="{_row(com)}" mass="{m}" diaginertia="{_row(moments)}"/>' + "".join(sites)
 
     law = f'damping="{rng.uniform(0.02, 0.3)}"'
     if kind == "flexible":

@@ -23,7 +23,7 @@ from mocobot_view.payload import BAR_M, BAR_RGBA, Bases, Grasps, PayloadMotion, 
 from mocobot_view.shapes import Shape, body_shape, capsule, join
 
 STRIDE = 20
-"""Of the samples that place the bases. Chosen."""
+"""Step between the samples that place the bases. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)
