@@ -26,12 +26,13 @@ from estimator.inputs import file_sha256
 from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording
 from estimator.strict import Fields, is_number, read_json
+from estimator.two_bodies.result import FORMAT as TWO_BODIES
 from mocobot_report import CAMPAIGN_FORMAT as CAMPAIGN
 from mocobot_report import SOUGHT, check_folder
 from mocobot_sim.paper.tables import paper_tables, summary_table
-from mocobot_view.payload import read_estimate
+from mocobot_view.payload import read_any_estimate, read_estimate
 
-KINDS = ("paper", "estimate", "calibration", "diagnosis", "joint-calibration", "campaign")
+KINDS = ("paper", "estimate", "calibration", "diagnosis", "joint-calibration", "campaign", "two-bodies")
 """Kinds of results, in the order of the page."""
 PROVENANCE = "mocobot-provenance"
 TRIAL_KEYS = ("rotation_deg", "torque_Nm", "rod_error_m", "weld_error_m", "weld_error_deg")
@@ -42,7 +43,7 @@ Json = dict[str, Any]
 class Result:
     kind: str  # one of KINDS
     path: Path
-    found: Any  # Paper, PayloadEstimate, Calibration, Diagnosed, Told, or a campaign's summary
+    found: Any  # Paper, PayloadEstimate, TwoBodies, Calibration, Diagnosed, Told, or a campaign's summary
     provenance: Json | None
     files: tuple[Path, ...]  # files from which it was read
 
@@ -87,7 +88,7 @@ def read_folder(folder: Path) -> list[Result]:
 def _kind(path: Path, values: Json) -> str | None:
     if path.name in ("paper.json", "diagnosis.json"):
         return path.stem
-    known = (ESTIMATE, CALIBRATION, DIAGNOSIS, JOINT_CALIBRATION, CAMPAIGN)
+    known = (ESTIMATE, CALIBRATION, DIAGNOSIS, JOINT_CALIBRATION, CAMPAIGN, TWO_BODIES)
     formats: dict[str, str] = dict(zip(known, KINDS[1:], strict=True))
     named = values.get("format")
     return formats.get(named) if isinstance(named, str) else None
@@ -139,6 +140,10 @@ def _provenance_within(values: Json) -> Json | None:
     return made if isinstance(made, dict) else None
 
 
+def _two_bodies(path: Path, values: Json) -> Result:
+    return Result("two-bodies", path, read_any_estimate(path), _provenance_within(values), (path,))
+
+
 def _estimate(path: Path, values: Json) -> Result:
     version = values.get("version")
     if version != ESTIMATE_VERSION:
@@ -176,7 +181,7 @@ def _campaign(path: Path, values: Json) -> Result:
 
 READERS: Mapping[str, Callable[[Path, Json], Result]] = {
     "paper": _paper, "estimate": _estimate, "calibration": _calibration, "diagnosis": _diagnosis,
-    "joint-calibration": _calibration, "campaign": _campaign,
+    "joint-calibration": _calibration, "campaign": _campaign, "two-bodies": _two_bodies,
 }  # fmt: skip
 
 

@@ -20,7 +20,17 @@ from discrepancy.evidence.settings import SETTINGS
 from estimator.errors import InputError
 from estimator.files import add_written, check_target, file_facts, whole_file
 from estimator.inputs import printable
-from mocobot_report import NAME, SUFFIX, calibration, campaign, diagnosis, estimate, joint_calibration, paper
+from mocobot_report import (
+    NAME,
+    SUFFIX,
+    calibration,
+    campaign,
+    diagnosis,
+    estimate,
+    joint_calibration,
+    paper,
+    two_bodies,
+)
 from mocobot_report.charts import Chart
 from mocobot_report.folder import Result, complete, read_folder
 from mocobot_report.numbers import counted, size
@@ -33,6 +43,7 @@ Context = dict[str, Any]
 PARTS: Mapping[str, Callable[[Result, Say], Context]] = {
     "paper": paper.context, "estimate": estimate.context, "calibration": calibration.context,
     "diagnosis": diagnosis.context, "joint-calibration": joint_calibration.context, "campaign": campaign.context,
+    "two-bodies": two_bodies.context,
 }  # fmt: skip
 """Function per kind of result that returns the data of its template: ``title``, ``pictures`` and further names."""
 
@@ -225,7 +236,7 @@ def _jpeg(pixels: Any) -> str:
 
 
 def _word(kind: str) -> str:
-    return "experiment" if kind == "paper" else kind.rpartition("-")[2]
+    return {"paper": "experiment", "two-bodies": "estimate"}.get(kind, kind.rpartition("-")[2])
 
 
 def _called(result: Result) -> str:

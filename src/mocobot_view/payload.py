@@ -20,6 +20,8 @@ from estimator.estimate.grasps import single_robot
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from estimator.strict import Fields, read_json
+from estimator.two_bodies.result import FORMAT as TWO_BODIES
+from estimator.two_bodies.result import TwoBodies
 from mocobot_sim.scene.as_built import read_units, theta_x_zeros
 from mocobot_sim.scene.models import payload_names
 from mocobot_sim.scene.payload import grasp_frames, load_payload
@@ -159,7 +161,7 @@ def held(facts: BodyFacts | None, robots: int) -> Grasps | None:
     return Grasps(single_robot().R_1i, single_robot().p_1i) if robots == 1 else None
 
 
-def check_robots(estimate: PayloadEstimate, recording: Recording) -> None:
+def check_robots(estimate: PayloadEstimate | TwoBodies, recording: Recording) -> None:
     """Refuse an estimate and a recording with different numbers of robots."""
     robots = recording.metadata.robots
     if estimate.robots != robots:
@@ -190,7 +192,9 @@ TRUTH = ("grasps", "mass_kg", "p_1c_m", "R_1c_rotvec_deg", "principal_inertia_kg
 """Keys of the truth that pictures show."""
 
 
-def read_truth(recording: Path, robots: int, estimate: PayloadEstimate | None = None) -> BodyFacts:
+def read_truth(
+    recording: Path, robots: int, estimate: PayloadEstimate | TwoBodies | None = None
+) -> BodyFacts:
     """Read the truth beside a simulated recording, in the frames of the estimate if one is given."""
     path = truth_path(recording)
     values = read_json(path, "the truth beside a simulated recording")
@@ -208,15 +212,26 @@ def read_truth(recording: Path, robots: int, estimate: PayloadEstimate | None = 
     )
     p_1i = np.array([entry.array("p_1i_m", (3,)) for entry in each])
     parts = [np.array(R_1i), p_1i, truth.array("p_1c_m", (3,)), R_1c]
-    if estimate is not None and estimate.zero_sd_rad and "as_built" in truth:
+    if isinstance(estimate, PayloadEstimate) and estimate.zero_sd_rad and "as_built" in truth:
         parts = seen_by_encoders(theta_x_zeros(read_units(path), robots), *parts)
     R, p, p_1c, R_1c = parts
     moments = truth.array("principal_inertia_kgm2", (3,))
     return BodyFacts(Grasps(R, p), truth.number("mass_kg"), p_1c, R_1c, moments)
 
 
+def read_any_estimate(path: Path) -> PayloadEstimate | TwoBodies:
+    """Read an estimate of one body or two that ``mocobot estimate --out`` wrote."""
+    values = read_json(path, "an estimate")
+    if values.get("format") != TWO_BODIES:
+        return read_estimate(path)
+    try:
+        return TwoBodies.from_dict(values)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
 def read_estimate(path: Path) -> PayloadEstimate:
-    """Read an estimate that ``mocobot estimate --out`` wrote."""
+    """Read an estimate of one body that ``mocobot estimate --out`` wrote."""
     values = read_json(path, "an estimate")
     try:
         estimate = PayloadEstimate.from_dict(values)

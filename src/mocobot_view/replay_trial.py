@@ -19,6 +19,7 @@ from estimator.recording.model import Recording
 from estimator.rigid_team import fuse
 from estimator.signals import GraspData, process_recording
 from estimator.statistics import rms
+from estimator.two_bodies.result import TwoBodies
 from mocobot_view.payload import (
     Bases,
     BodyFacts,
@@ -119,7 +120,7 @@ class ReplayTrial:
 def replay_trial(
     recording: Recording,
     name: str,
-    estimate: PayloadEstimate | None = None,
+    estimate: PayloadEstimate | TwoBodies | None = None,
     truth: BodyFacts | None = None,
     diagnosis: WrittenDiagnosis | None = None,
     payload: str | Path | None = None,
@@ -128,20 +129,24 @@ def replay_trial(
 
     Args:
         recording, name: one trial, and the name of its replay.
-        estimate: estimate of the payload; None to estimate from this recording, as far as possible.
+        estimate: estimate of the payload, of one body or two; None to estimate from this recording, as far as possible.
         truth, diagnosis: true payload, and diagnosis of these robots.
         payload: name or MJCF of the geometry of one rigid payload; None for that of the recording's label.
     """
+    given = estimate if isinstance(estimate, TwoBodies) else None
+    estimate = None if isinstance(estimate, TwoBodies) else estimate
     recording = as_estimated(recording, estimate)
     meta = recording.metadata
     notes: list[str] = []
+    if given is not None:
+        check_robots(given, recording)
     if meta.trial == FREE:
         notes.append(
             "The robots hold nothing: they are drawn in a row, without a payload, an estimate or forces on one."
         )
         estimate = truth = None
     else:
-        estimate = _given(estimate, recording, notes) if estimate else _estimated(recording, notes)
+        estimate = _given(estimate, recording, notes) if estimate else _estimated(recording, notes, given)
     if diagnosis is not None:
         _check_diagnosis(diagnosis, recording, notes)
     phi, theta, _ = true_joints(meta.arms, recording.phi, recording.theta, recording.tau)
@@ -152,11 +157,13 @@ def replay_trial(
     grasps = held(facts, meta.robots)
     bases, motion = placed(R_bi, wrist, grasps, height, meta.arms)
     two = None
-    if meta.trial != FREE and payload is None and (motion is None or _misfits(motion)):
+    if meta.trial != FREE and payload is None and given is None and (motion is None or _misfits(motion)):
         two = two_body_motion(recording, R_bi, wrist, height)
-    if two is not None and _misfits(two.first):
+    if given is not None and meta.trial != FREE:
+        two = two_body_motion(recording, R_bi, wrist, height, given)
+    elif two is not None and _misfits(two.first):
         two = None
-    if two is not None and motion is not None:
+    if two is not None and motion is not None and given is None:
         gap, left = rms(motion.gap_position_m), rms(two.first.gap_position_m)
         two = two if left < gap / BETTER else None
     if two is not None:
@@ -222,7 +229,9 @@ def _given(estimate: PayloadEstimate, recording: Recording, notes: list[str]) ->
     return estimate
 
 
-def _estimated(recording: Recording, notes: list[str]) -> PayloadEstimate | None:
+def _estimated(recording: Recording, notes: list[str], given: TwoBodies | None) -> PayloadEstimate | None:
+    if given is not None:
+        return None
     try:
         return estimate_payload([recording])
     except InputError as error:

@@ -12,12 +12,18 @@ from scipy.spatial.transform import Rotation
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.recording.model import Recording
-from estimator.two_bodies.relative import Candidate, relative_motion
+from estimator.two_bodies.relative import relative_motion
+from estimator.two_bodies.result import TwoBodies
+from estimator.two_bodies.start import bases_of
+from estimator.two_bodies.team import Pair
 from mocobot_sim.scene.models import payload_names, posed
 from mocobot_sim.scene.payload import SECOND, load_payload, payload_joint
 from mocobot_sim.scene.pymjcf import compiled
 from mocobot_view.payload import BAR_M, BAR_RGBA, Bases, Grasps, PayloadMotion, payload_motion
 from mocobot_view.shapes import Shape, body_shape, capsule, join
+
+STRIDE = 20
+"""Step between the samples that place the bases. Chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,52 +52,61 @@ class TwoBodyMotion:
     sentence: str
 
 
-def two_body_motion(recording: Recording, R_bi: Array, p_bi: Array, height_m: float) -> TwoBodyMotion | None:
+def two_body_motion(
+    recording: Recording, R_bi: Array, p_bi: Array, height_m: float, given: TwoBodies | None = None
+) -> TwoBodyMotion | None:
     """Find two bodies in a recording by its kinematics; None if one body or none explains it better.
 
     Args:
         recording: one trial.
         R_bi, p_bi: grasps in level base frames, shapes (Q, N, 3, 3) and (Q, N, 3) [m].
         height_m: height of {b1} over the floor [m].
+        given: estimate whose grasps and joint are taken; None to find them here.
     """
-    try:
-        best = relative_motion([recording])[0]
-    except InputError:
-        return None
-    if best.axis is None:
-        return None
-    pair = best.fitted.point.pair
-    bases = Bases(pair.bases[0].R, pair.bases[0].p + np.array([0.0, 0.0, height_m]))
+    if given is not None:
+        pair = given.pair(())
+        pair = given.pair((bases_of(pair, (R_bi[::STRIDE], p_bi[::STRIDE])),))
+    else:
+        try:
+            best = relative_motion([recording])[0]
+        except InputError:
+            return None
+        if best.axis is None:
+            return None
+        pair = best.fitted.point.pair
+    own, axis, slides = pair.bases[0], pair.joint.axes[:, 0], pair.joint.motion == "sliding"
+    bases = Bases(own.R, own.p + np.array([0.0, 0.0, height_m]))
     each = []
     for half in pair.halves:
         at = list(half)
-        own = Bases(bases.R_Wb[at], bases.p_Wb[at])
-        each.append(payload_motion(R_bi[:, at], p_bi[:, at], Grasps(pair.R[at], pair.p[at]), own))
+        of_half = Bases(bases.R_Wb[at], bases.p_Wb[at])
+        each.append(payload_motion(R_bi[:, at], p_bi[:, at], Grasps(pair.R[at], pair.p[at]), of_half))
     order = np.argsort(np.concatenate(pair.halves))
     gaps = [np.concatenate([getattr(one, name) for one in each], axis=1)[:, order]
             for name in ("gap_rotation_rad", "gap_position_m")]  # fmt: skip
     first = replace(each[0], gap_rotation_rad=gaps[0], gap_position_m=gaps[1])
-    _, joint, pose = pair.loops(R_bi, p_bi, pair.bases[0])
-    centre = pose[1].mean(axis=0) / 2.0  # halfway between the first robots of both bodies
-    at = np.zeros(3) if best.pivot is None else best.pivot
-    pivot = at + best.axis * (best.axis @ (centre - at)) if best.pivot is not None else centre
+    _, joint, pose = pair.loops(R_bi, p_bi, own)
+    pivot = pose[1].mean(axis=0) / 2.0  # halfway between the first robots of both bodies
+    if not slides:
+        pivot = pair.joint.pivot + axis * (axis @ (pivot - pair.joint.pivot))
     back = Rotation.from_matrix(pair.joint.R_0).inv()
     shapes = _cad(recording, pair.halves) or (
         _bars(pair.p[list(pair.halves[0])], pivot),
         _bars(pair.p[list(pair.halves[1])], back.apply(pivot - pair.joint.p_0)),
     )
-    return TwoBodyMotion(
-        first, each[1], bases, shapes, best.axis, pivot, best.motion == "sliding", joint.q, said(best)
-    )
+    return TwoBodyMotion(first, each[1], bases, shapes, axis, pivot, slides, joint.q, _said(pair, joint.q))
 
 
-def said(found: Candidate) -> str:
-    """Describe the joint that a candidate finds, in a sentence."""
-    first, second = (f"robot{'s' * (len(half) > 1)} {', '.join(map(str, half))}" for half in found.halves)
-    size = (
-        f"{1e3 * found.q_rms:.0f} mm" if found.motion == "sliding" else f"{np.rad2deg(found.q_rms):.1f} deg"
+def _said(pair: Pair, q: Array) -> str:
+    """Describe the joint and its motion in a sentence."""
+    first, second = (
+        f"robot{'s' * (len(half) > 1)} {', '.join(str(i + 1) for i in half)}" for half in pair.halves
     )
-    return f"The payload is {found.motion} between {first} and {second}; the joint moves by {size} (rms)."
+    size = float(np.std(q))
+    shown = f"{1e3 * size:.0f} mm" if pair.joint.motion == "sliding" else f"{np.rad2deg(size):.1f} deg"
+    return (
+        f"The payload is {pair.joint.motion} between {first} and {second}; the joint moves by {shown} (rms)."
+    )
 
 
 def _cad(recording: Recording, halves: Sequence[Sequence[int]]) -> tuple[Shape | None, Shape | None] | None:

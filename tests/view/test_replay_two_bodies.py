@@ -4,20 +4,25 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from estimator.two_bodies.estimate import estimate_two_bodies
 from mocobot_sim.trial.sensors import sensor_preset
 from mocobot_sim.trial.simulate import TrialRequest, simulate
 from mocobot_view.replay_trial import replay_trial
 
 
-@pytest.mark.parametrize("name", ["sliding", "folding"])
-def test_both_bodies_move_as_simulated(name):
+@pytest.mark.parametrize(("name", "given"), [("sliding", False), ("folding", False), ("folding", True)])
+def test_both_bodies_move_as_simulated(name, given):
     done = simulate(TrialRequest(name, "periodic", duration_s=12.0), [sensor_preset("nominal")])
-    trial, truth = replay_trial(done.recordings["nominal"], "trial"), done.truth
+    recording, truth = done.recordings["nominal"], done.truth
+    estimate = estimate_two_bodies([recording], "hinged") if given else None
+    trial = replay_trial(recording, "trial", estimate)
     assert trial.two is not None
     q, two = truth.position, trial.two
     k, axis = truth.bodies[1].robots[0] - 1, truth.joint.axis_1
     sign = np.sign(two.axis @ axis)
     assert np.std(sign * two.q - q) < 2e-4
+    if estimate is not None:
+        np.testing.assert_allclose(two.q, estimate.true_position(truth.to_dict()), rtol=0, atol=2e-4)
     # The pose of {k} in {1} by MuJoCo's joint, against the drawn bodies.
     turn = Rotation.from_rotvec(np.outer(0.0 * q if truth.joint.slides else q, axis))
     R = turn.as_matrix() @ truth.R_1i[k]

@@ -7,6 +7,7 @@ payload, robots            label or null; N
 kind, motion               "hinged", "sliding" or "flexible"; "hinged" or "sliding"
 halves                     numbers of the robots that hold body A (robot 1 is of them) and body B
 joint                      axis_1 [3], axis_se_deg, pivot_1_m [3] and pivot_se_m (null if sliding)
+    covariance             of turns of the axis about y and z [rad] and, with a hinge, shifts of the pivot [m]
     axes_1                 columns (axis, y, z) in {1}, 3 x 3
     zero                   {p_1k_m, R_1k_rotvec_deg}: pose of {k}, the grasp of B's first robot, at q = 0
     q_low, q_high, q_rms   [u]
@@ -36,9 +37,10 @@ from scipy.spatial.transform import Rotation
 from estimator.arrays import Array, inertia_parameters
 from estimator.errors import InputError
 from estimator.estimate.uncertainty import WeakDirection, numerical_jacobian, standard_errors
+from estimator.rigid_team import Bases
 from estimator.statistics import measured
 from estimator.two_bodies.split import body_of, hidden, pseudo_inertia, split
-from estimator.two_bodies.team import NAMES, Joint, Motion, expand
+from estimator.two_bodies.team import NAMES, Joint, Motion, Pair, expand
 
 FORMAT, VERSION = "mocobot-two-bodies", 1
 
@@ -86,7 +88,8 @@ class TwoBodies:
         kind: "flexible" if the joint has a spring, else ``motion``.
         halves: robots (from 1) of bodies A and B.
         axes: the joint's axis and two normals in {1}, as columns, shape (3, 3).
-        axis_se_rad, pivot_se_m: standard errors of the axis' direction, and of the pivot across it.
+        joint_covariance: of turns of the axis about its two normals [rad] and, with a hinge, shifts of the pivot along
+            them [m], shape (2, 2) or (4, 4).
         pivot: point on a hinge's axis in {1} [m], or None.
         R_0, p_0: pose of {k} in {1} at q = 0; {k} is the grasp frame of the first robot of B.
         R_ki, p_ki: grasps in the frame of their body, shapes (N, 3, 3) and (N, 3).
@@ -104,9 +107,8 @@ class TwoBodies:
     motion: Motion
     halves: tuple[tuple[int, ...], tuple[int, ...]]
     axes: Array
-    axis_se_rad: float
     pivot: Array | None
-    pivot_se_m: float | None
+    joint_covariance: Array
     R_0: Array
     p_0: Array
     R_ki: Array
@@ -124,11 +126,26 @@ class TwoBodies:
     why: str = ""
 
     @property
+    def axis_se_rad(self) -> float:
+        """Standard error of the direction of the axis."""
+        return float(np.sqrt(np.trace(self.joint_covariance[:2, :2])))
+
+    @property
+    def pivot_se_m(self) -> float | None:
+        """Standard error of the pivot across the axis; None for a slide."""
+        return None if self.pivot is None else float(np.sqrt(np.trace(self.joint_covariance[2:, 2:])))
+
+    @property
     def joint(self) -> Joint:
         """The joint as the equations use it."""
         return Joint(
             self.motion, self.R_0, self.p_0, self.axes, np.zeros(3) if self.pivot is None else self.pivot
         )
+
+    def pair(self, bases: tuple[Bases, ...]) -> Pair:
+        """Grasps and joint as the equations use them, with the bases of trials."""
+        first, second = (tuple(i - 1 for i in half) for half in self.halves)
+        return Pair((first, second), self.R_ki, self.p_ki, self.joint, bases)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -145,25 +162,30 @@ class TwoBodies:
         n = 10 + len(NAMES[self.motion])
         return pseudo_inertia(parameters[:10]), pseudo_inertia(expand(self.motion) @ parameters[10:n])
 
-    def _at_zero(self) -> Array:
-        """Transform from {J} at q = 0 to {1}."""
+    def _at_zero(self, q: float = 0.0) -> Array:
+        """Transform from {J} at q to {1}."""
         T = np.eye(4)
-        T[:3, :3], T[:3, 3] = self.joint.at(0.0)
+        T[:3, :3], T[:3, 3] = self.joint.at(q)
         return T
 
     @property
     def whole(self) -> tuple[Body, Array]:
         """Both bodies with the joint at zero, and standard errors of (m, centre of mass, six moments), shape (10,)."""
         T = self._at_zero()
-
-        def numbers(parameters: Array) -> Array:
-            P_A, P_B = self._pseudo(parameters)
-            m, c, inertia = body_of(P_A + T @ P_B @ T.T)
-            return np.array([m, *c, *inertia_parameters(inertia)])
-
-        J = numerical_jacobian(numbers, self.parameters)
         P_A, P_B = self._pseudo(self.parameters)
-        return Body(*body_of(P_A + T @ P_B @ T.T)), standard_errors(J @ self.covariance @ J.T)
+        return Body(*body_of(P_A + T @ P_B @ T.T)), standard_errors(self.whole_at(0.0)[1])
+
+    def whole_at(self, q: float) -> tuple[Array, Array]:
+        """Return ``whole_of`` the estimate with the joint at q, and its covariance."""
+        J = numerical_jacobian(lambda x: self.whole_of(x, q), self.parameters)
+        return self.whole_of(self.parameters, q), J @ self.covariance @ J.T
+
+    def whole_of(self, parameters: Array, q: float = 0.0) -> Array:
+        """Return (m, centre of mass, six moments about it) in {1} of parameters in this estimate's frames."""
+        P_A, P_B = self._pseudo(parameters)
+        T = self._at_zero(q)
+        m, c, inertia = body_of(P_A + T @ P_B @ T.T)
+        return np.array([m, *c, *inertia_parameters(inertia)])
 
     @property
     def bodies(self) -> tuple[Body, Body, tuple[float, float]] | None:
@@ -196,18 +218,29 @@ class TwoBodies:
         ten_A, ten_B = _ten(A + G_A @ Z @ G_A.T), _ten(P - G_B @ Z @ G_B.T)
         values = {key.split("_N")[0]: value for key, value in told.items() if isinstance(value, float)}
         rest = told.get("rest_rad", told.get("rest_m", 0.0))
-        k = truth["bodies"][1]["robots"][0] - 1
-        zero = truth["grasps"][k]
-        R = Rotation.from_rotvec(zero["R_1i_rotvec_deg"], degrees=True).as_matrix()
-        q = joint.coordinates(R[None], np.array([zero["p_1i_m"]]))[0][0]
+        q = self._true_zero(truth)
         terms = {
             "damping": values.get("damping", 0.0),
             "friction": 0.0,
             "stiffness": values.get("stiffness", 0.0),
-            "offset": values.get("stiffness", 0.0) * (rest + q),
+            "offset": values.get("stiffness", 0.0)
+            * (np.sign(self.axes[:, 0] @ np.array(told["axis_1"])) * rest + q),
         }
         own = np.linalg.pinv(expand(self.motion)) @ ten_B
         return np.array([*ten_A, *own, *(terms[term] for term in self.law)])
+
+    def _true_zero(self, truth: dict[str, Any]) -> float:
+        """Return the coordinate at which the true joint has its zero."""
+        zero = truth["grasps"][truth["bodies"][1]["robots"][0] - 1]
+        R = Rotation.from_rotvec(zero["R_1i_rotvec_deg"], degrees=True).as_matrix()
+        return float(self.joint.coordinates(R[None], np.array([zero["p_1i_m"]])).q[0])
+
+    def true_position(self, truth: dict[str, Any]) -> Array | None:
+        """Return the true joint position in every row [rad, m], along this estimate's axis and from its zero."""
+        told = truth["joint"]
+        q = told.get("position_rad", told.get("position_m"))
+        sign = np.sign(self.axes[:, 0] @ np.array(told["axis_1"]))
+        return None if q is None else sign * np.array(q) + self._true_zero(truth)
 
     def to_dict(self) -> dict[str, Any]:
         """Convert to the format documented in this module."""
@@ -227,6 +260,7 @@ class TwoBodies:
                 "axis_se_deg": float(np.rad2deg(self.axis_se_rad)),
                 "pivot_1_m": None if self.pivot is None else self.pivot.tolist(),
                 "pivot_se_m": self.pivot_se_m,
+                "covariance": self.joint_covariance.tolist(),
                 "axes_1": self.axes.tolist(),
                 "zero": {"p_1k_m": self.p_0.tolist(), "R_1k_rotvec_deg": _rotvec_deg(self.R_0)},
                 "q_low": self.q_low,
@@ -286,9 +320,8 @@ class TwoBodies:
                 **{key: values[key] for key in ("payload", "robots", "kind", "motion", "why")},
                 halves=_halves(values["halves"]),
                 axes=np.array(joint["axes_1"]),
-                axis_se_rad=float(np.deg2rad(joint["axis_se_deg"])),
                 pivot=None if pivot is None else np.array(pivot),
-                pivot_se_m=joint["pivot_se_m"],
+                joint_covariance=np.array(joint["covariance"]),
                 R_0=_matrix(zero["R_1k_rotvec_deg"]),
                 p_0=np.array(zero["p_1k_m"]),
                 R_ki=np.array([_matrix(one["R_ki_rotvec_deg"]) for one in grasps]),
@@ -389,7 +422,7 @@ def format_two_bodies(found: TwoBodies, truth: dict[str, Any] | None = None) -> 
         lines.append("    friction:       none seen")
     whole, se = found.whole
     lines += ["[[Both bodies, joint at zero]]"]
-    known = None if true is None else _whole_of(found, true)
+    known = None if true is None else found.whole_of(true)
     names = ("m", "p_1c x", "p_1c y", "p_1c z", "Ixx", "Iyy", "Izz")
     values = np.array([whole.mass, *whole.com, *inertia_parameters(whole.inertia)])
     for name, k in zip(names, (0, 1, 2, 3, 4, 7, 9), strict=True):
@@ -432,13 +465,6 @@ def format_two_bodies(found: TwoBodies, truth: dict[str, Any] | None = None) -> 
     if found.flags:
         lines += ["[[Flags]]"] + [f"    {flag}" for flag in found.flags]
     return "\n".join(lines)
-
-
-def _whole_of(found: TwoBodies, parameters: Array) -> Array:
-    P_A, P_B = found._pseudo(parameters)
-    T = found._at_zero()
-    m, c, inertia = body_of(P_A + T @ P_B @ T.T)
-    return np.array([m, *c, *inertia_parameters(inertia)])
 
 
 def _axis_error(found: TwoBodies, truth: dict[str, Any] | None) -> tuple[str, str]:

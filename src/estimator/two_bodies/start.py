@@ -38,7 +38,7 @@ def start(motion: Motion, halves: tuple[tuple[int, ...], tuple[int, ...]], trial
             R[i], p[i] = fixed.R_0, fixed.p_0
     joint = _joint_start(motion, _of(main, 0), _of(main, b))
     pair = Pair(halves, R, p, joint, ())
-    return Pair(halves, R, p, joint, tuple(_bases(pair, trial) for trial in trials))
+    return Pair(halves, R, p, joint, tuple(bases_of(pair, trial) for trial in trials))
 
 
 def rigid_residual(poses: Poses, i: int, j: int) -> float:
@@ -47,7 +47,7 @@ def rigid_residual(poses: Poses, i: int, j: int) -> float:
     joint = _joint_start("rigid", A, B)
     pair = Pair(((0,), (1,)), np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)), joint, ())
     both = np.stack([A[0], B[0]], axis=1), np.stack([A[1], B[1]], axis=1)
-    left = pair.loops(*both, _bases(pair, both))[1].left
+    left = pair.loops(*both, bases_of(pair, both))[1].left
     return float(np.sqrt(np.mean(np.sum(left**2, axis=1))))
 
 
@@ -140,7 +140,7 @@ def _basis(a: Array) -> Array:
     return np.column_stack([a, n, so3.cross(a, n)])
 
 
-def _bases(pair: Pair, poses: Poses) -> Bases:
+def bases_of(pair: Pair, poses: Poses) -> Bases:
     """Return base poses of one trial, with grasps and joint given."""
     R, h = poses
     N, joint = h.shape[1], pair.joint

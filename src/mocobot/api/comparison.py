@@ -3,7 +3,7 @@
 Keys of the JSON:
 
 format, version     "mocobot-comparison", 1
-kind                "estimate", "calibration", "joint calibration" or "diagnosis"
+kind                "estimate", "estimate of two bodies", "calibration", "joint calibration" or "diagnosis"
 a, b                names of the compared files or folders
 changed             whether anything differs by more than its standard errors
 groups              list of {name, unit, chi2, dof, p, changed, together, quantities}: p is the p-value of the
@@ -36,6 +36,8 @@ from estimator.extras import draws_plots
 from estimator.files import write_json, write_text
 from estimator.statistics import measured
 from estimator.strict import read_json
+from estimator.two_bodies.result import FORMAT as TWO_BODIES
+from estimator.two_bodies.result import TwoBodies
 from mocobot.api import comparison_groups as groups_of
 from mocobot.api.comparison_groups import LEVEL, TOGETHER, Group
 from mocobot.checks import CALIBRATION as CALIBRATION_NAME
@@ -43,7 +45,8 @@ from mocobot.results import Folder
 
 FORMAT, VERSION = "mocobot-comparison", 1
 NAME, REPORT, PICTURE = "comparison.json", "report.txt", "comparison.png"
-KINDS = {ESTIMATE: "estimate", CALIBRATION: "calibration", DIAGNOSIS: "diagnosis"}
+TWO = "estimate of two bodies"
+KINDS = {ESTIMATE: "estimate", TWO_BODIES: TWO, CALIBRATION: "calibration", DIAGNOSIS: "diagnosis"}
 KINDS["mocobot-joint-calibration"] = "joint calibration"  # discrepancy.joints.calibrated loads mujoco
 SOUGHT = "an estimate of `mocobot estimate`, or a calibration or diagnosis of `mocobot calibrate` or `diagnose --out`"
 WIDTH = 110
@@ -54,7 +57,8 @@ class Comparison(Folder):
     """Differences between two results of one kind; prints as text and writes a folder.
 
     Attributes:
-        kind: ``"estimate"``, ``"calibration"``, ``"joint calibration"`` or ``"diagnosis"``.
+        kind: ``"estimate"``, ``"estimate of two bodies"``, ``"calibration"``, ``"joint calibration"`` or
+            ``"diagnosis"``.
         a, b: names of the results.
         groups: quantities that both results contain, with their differences.
         changes: findings that only one result has or that differ, one sentence each.
@@ -97,7 +101,7 @@ class Comparison(Folder):
 
     def __str__(self) -> str:
         """Return the text report."""
-        plural = "diagnoses" if self.kind == "diagnosis" else f"{self.kind}s"
+        plural = {"diagnosis": "diagnoses", TWO: "estimates of two bodies"}.get(self.kind, f"{self.kind}s")
         lines = [f"Two {plural}: A is {self.a}", f"{'':{len(plural) + 6}}B is {self.b}", ""]
         lines += _fill(self.verdict)
         lines += [line for sentence in self.changes for line in _fill(sentence, "- ")]
@@ -181,6 +185,9 @@ def compare(a: Any, b: Any) -> Comparison:
     x, y, changes = one.value, other.value, []
     if one.kind == "estimate":
         groups, notes = groups_of.estimate_groups(x, y), groups_of.estimate_notes(x, y)
+    elif one.kind == TWO:
+        groups, notes = groups_of.two_body_groups(x, y), groups_of.two_body_notes(x, y)
+        changes = groups_of.two_body_changes(x, y)
     elif one.kind == "calibration":
         groups, notes = groups_of.calibration_groups(x, y), groups_of.calibration_notes(x, y)
     elif one.kind == "joint calibration":
@@ -233,9 +240,9 @@ def _file(path: Path) -> Path:
 
 def _result(name: str, where: str, values: dict[str, Any]) -> _Result:
     kind, value = KINDS.get(str(values.get("format"))), values
-    if kind == "estimate":
+    if kind in ("estimate", TWO):
         try:
-            value: Any = PayloadEstimate.from_dict(values)
+            value: Any = (PayloadEstimate if kind == "estimate" else TwoBodies).from_dict(values)
         except InputError as error:
             raise InputError(f"{where}: {error}") from error
     elif kind == "calibration":
@@ -255,7 +262,7 @@ def _result(name: str, where: str, values: dict[str, Any]) -> _Result:
 
 
 def _a(kind: str) -> str:
-    return f"{'an' if kind == 'estimate' else 'a'} {kind}"
+    return f"{'an' if kind.startswith('estimate') else 'a'} {kind}"
 
 
 def _values(group: Group, changed: bool) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from estimator.errors import InputError
 from estimator.estimate.grasps import GraspEstimate
 from estimator.estimate.inertia import PARAMETERS
 from estimator.estimate.result import PayloadEstimate
+from estimator.two_bodies.result import UNITS, TwoBodies
 
 if TYPE_CHECKING:
     from discrepancy.joints.calibrated import Told
@@ -198,6 +199,71 @@ def estimate_groups(a: PayloadEstimate, b: PayloadEstimate) -> list[Group]:
     if a.grasps and b.grasps:
         groups += grasp_groups(a.grasps, b.grasps)
     return groups
+
+
+def two_body_groups(a: TwoBodies, b: TwoBodies) -> list[Group]:
+    """Group the joint's axis, pivot and terms, and both bodies together with the joint where A has its zero.
+
+    Empty if other robots hold the bodies or the joint is of another kind.
+
+    Raises:
+        InputError: the estimates differ in their number of robots.
+    """
+    if a.robots != b.robots:
+        raise InputError(
+            f"the estimates are of {a.robots} and {b.robots} robots; both must be of the same number"
+        )
+    if (a.motion, a.halves) != (b.motion, b.halves):
+        return []
+    N, N_b, axis_b = a.axes[:, 1:], b.axes[:, 1:], b.axes[:, 0]
+    sign, turn = np.sign(a.axes[:, 0] @ axis_b), np.rad2deg(N.T @ N_b)
+    none, off = np.zeros(2), np.rad2deg(N.T @ so3.cross(a.axes[:, 0], sign * axis_b))
+    axes = np.rad2deg(np.rad2deg(a.joint_covariance[:2, :2])), turn @ b.joint_covariance[:2, :2] @ turn.T
+    across = "across it, y", "across it, z"
+    groups = [Group.of("axis from A's", "deg", across, (none, axes[0]), (off, axes[1]))]
+    if a.pivot is not None and b.pivot is not None:
+        along = axis_b @ (a.pivot - b.pivot)  # both lines are compared at A's pivot
+        by_turn = along * np.column_stack([so3.cross(n, axis_b) for n in N_b.T])
+        J = N.T @ np.hstack([by_turn, N_b])
+        apart = N.T @ (b.pivot + along * axis_b - a.pivot), J @ b.joint_covariance @ J.T
+        groups.append(Group.of("pivot from A's", "m", across, (none, a.joint_covariance[2:, 2:]), apart))
+    zero = float(b.joint.coordinates(a.R_0[None], a.p_0[None]).q[0])
+    (x, of_x), (y, of_y) = a.whole_at(0.0), b.whole_at(zero)
+    parts = ("mass", "kg", ("",), slice(1)), ("centre of mass", "m", XYZ, slice(1, 4))
+    for name, unit, entries, at in (*parts, ("inertia", "kg m^2", PARAMETERS, slice(4, None))):
+        groups.append(Group.of(name, unit, entries, (x[at], of_x[at, at]), (y[at], of_y[at, at])))
+    for term in (term for term in a.law if term in b.law):
+        i, j = a.names.index(term), b.names.index(term)
+        row = np.zeros(len(b.names))
+        row[j] = 1.0
+        if term == "offset":  # of a position that counts from A's zero, in the direction of A's axis
+            row[j], row[b.names.index("stiffness")] = sign, -sign * zero
+        own = a.parameters[[i]], a.covariance[[i]][:, [i]]
+        other = np.array([row @ b.parameters]), np.array([[row @ b.covariance @ row]])
+        groups.append(Group.of(term, UNITS[a.motion][term], ("",), own, other))
+    return groups
+
+
+def two_body_changes(a: TwoBodies, b: TwoBodies) -> list[str]:
+    """Say which joint and which of its terms only one estimate has."""
+    said = [
+        f"{one.motion} between robots {' | '.join(' '.join(map(str, half)) for half in one.halves)}"
+        for one in (a, b)
+    ]
+    if said[0] != said[1]:
+        return [f"The payload is {said[0]} in A, and {said[1]} in B, so their numbers are not comparable."]
+    return [
+        f"Only {name} has {'friction' if term == 'friction' else f'a term of {term}'} in the joint."
+        for name, one, other in (("A", a, b), ("B", b, a)) for term in one.law if term not in (*other.law, "offset")
+    ]  # fmt: skip
+
+
+def two_body_notes(a: TwoBodies, b: TwoBodies) -> list[str]:
+    """List caveats about the comparison of two estimates of two bodies, one sentence each."""
+    notes = [
+        "Grasps and the second body alone are not compared: their errors depend on where each has its joint."
+    ]
+    return notes + [f"{name} is flagged: {flag}" for name, one in (("A", a), ("B", b)) for flag in one.flags]
 
 
 def grasp_groups(

@@ -18,7 +18,7 @@ from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
 from estimator.strict import read_json
 from estimator.two_bodies.estimate import Kind, estimate_two_bodies
-from estimator.two_bodies.result import FORMAT, TwoBodies, format_two_bodies
+from estimator.two_bodies.result import TwoBodies, format_two_bodies
 from mocobot.api.recordings import Given, Robots, Say, quiet, recordings_of
 from mocobot.option_types import made
 from mocobot.options import EstimateOptions
@@ -170,9 +170,7 @@ def read_estimate(path: Path | str) -> Estimate | TwoBodyEstimate:
     Raises:
         InputError: the file cannot be read or is not a complete estimate.
     """
-    from mocobot_view.payload import read_estimate as read  # imports MuJoCo
+    from mocobot_view.payload import read_any_estimate  # imports MuJoCo
 
-    values = read_json(Path(path), "an estimate")
-    if values.get("format") == FORMAT:
-        return public(TwoBodyEstimate, TwoBodies.from_dict(values))
-    return public(Estimate, read(Path(path)))
+    found = read_any_estimate(Path(path))
+    return public(TwoBodyEstimate, found) if isinstance(found, TwoBodies) else public(Estimate, found)

@@ -19,12 +19,13 @@ from estimator.estimate.result import PayloadEstimate
 from estimator.files import check_target
 from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
+from estimator.two_bodies.result import TwoBodies
 from mocobot.api.recordings import Given, Robots, Say, quiet, read
 from mocobot.option_types import made
 from mocobot.options import ReplayOptions
 from mocobot_sim.scene.as_built import theta_x_zeros
 from mocobot_sim.trial.truth import GroundTruth
-from mocobot_view.payload import BodyFacts, Grasps, read_estimate, read_truth
+from mocobot_view.payload import BodyFacts, Grasps, read_any_estimate, read_truth
 from mocobot_view.replay_trial import ReplayTrial, distinct_names, replay_trial
 
 if TYPE_CHECKING:
@@ -106,7 +107,8 @@ def replay(
 
 def _trials(logs: list[Any], names: list[str], chosen: ReplayOptions) -> list[ReplayTrial]:
     given, payload, trials = chosen.estimate, chosen.payload, []
-    estimate = given if given is None or isinstance(given, PayloadEstimate) else read_estimate(Path(given))
+    made_already = isinstance(given, PayloadEstimate | TwoBodies | None)
+    estimate = given if made_already else read_any_estimate(Path(given))
     diagnosis = read_diagnosis(Path(chosen.diagnosis)) if chosen.diagnosis is not None else None
     if isinstance(payload, str) and payload.endswith(".xml"):
         payload = Path(payload)
@@ -164,10 +166,10 @@ def _torques(path: Path, joints: tuple[str, ...]) -> tuple[list[Trace], list[int
     return traces, [joints.index(name) for name in names]
 
 
-def facts_of_truth(truth: GroundTruth, estimate: PayloadEstimate | None) -> BodyFacts:
+def facts_of_truth(truth: GroundTruth, estimate: PayloadEstimate | TwoBodies | None) -> BodyFacts:
     """Extract the quantities of a truth that a replay draws, in the frames of the estimate if one is given."""
     parts = [truth.R_1i, truth.p_1i, truth.p_1c, truth.R_1c]
-    if estimate is not None and estimate.zero_sd_rad:
+    if isinstance(estimate, PayloadEstimate) and estimate.zero_sd_rad:
         parts = seen_by_encoders(theta_x_zeros(truth.units, len(truth.p_1i)), *parts)
     R, p, p_1c, R_1c = parts
     return BodyFacts(Grasps(R, p), truth.mass_kg, p_1c, R_1c, truth.principal_kgm2)
