@@ -11,14 +11,14 @@ import pytest
 from source_tree import SRC, module_files
 
 CEILINGS = {
-    "estimator": 8_240,
+    "estimator": 8_250,
     "mocobot_logs": 7_280,
     "mocobot_inspect": 2_930,
-    "mocobot_sim": 6_370,
-    "discrepancy": 14_658,
-    "mocobot_view": 2_240,
-    "mocobot_report": 2_790,
-    "mocobot": 4_990,
+    "mocobot_sim": 6_360,
+    "discrepancy": 14_860,
+    "mocobot_view": 2_280,
+    "mocobot_report": 2_930,
+    "mocobot": 5_050,
 }
 """Most lines of code a package (no blanks, comments or docstrings). Raise one only within a planned budget."""
 MOST_LINES = 700
