@@ -182,9 +182,6 @@ def _tiles(values: Values) -> list[tuple[str, str, str]]:
     if values["scatter"] and not named:
         worst = values["scatter"][0]
         out.append((worst["kind"], f"{about(worst['factor'])} ×", "spread over its tolerance"))
-        if told := values.get("foretold"):
-            of = f"chi²/n of each recording by the others; {plain(told['as_designed'])} as designed"
-            out.append(("predicted as found", plain(told["as_found"]), of))
     if gain and gain["removed"] is not None and named:
         low, high = gain["removed"]["interval"]
         interval = f"95 %: {percent(low)} to {percent(high)}" if low is not None and high is not None else ""

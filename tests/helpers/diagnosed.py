@@ -21,7 +21,7 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
     """
     assert set(values) - {"provenance"} == {
         "format", "version", "machine", "finished", "recordings", "reference", "prior_odds", "verdict", "causes",
-        "places", "suspected", "scatter", "foretold", "evidence", "gain", "not_simulated", "rollouts", "undecidable",
+        "places", "suspected", "scatter", "evidence", "gain", "not_simulated", "rollouts", "undecidable",
         "detection_limits", "residual", "remains", "notes",
     }  # fmt: skip
     assert (values["format"], values["version"], values["machine"]) == ("mocobot-diagnosis", 3, "team")
@@ -234,7 +234,6 @@ def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
         "prior_odds": None,
         "suspected": [],
         "scatter": [scattered()] if verdict == "miscalibrated" else [],
-        "foretold": None,
         "gain": {
             "held_out": {"before": before, "after": after, "as_found": None},
             "units": {"phi": "rad", "theta": "rad", "tau": "N m"},

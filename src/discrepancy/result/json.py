@@ -2,7 +2,7 @@
 
 format, version     "mocobot-diagnosis", 3; version 2 lacks ``machine``, ``finished`` and ``members``
 machine             "team", or "joints" for one robot of hinges and slides. The latter also has ``told``, ``event``,
-                    ``at``, ``reference`` and a limit's ``place``. Its ``prior_odds``, ``share_left``, ``foretold``,
+                    ``at``, ``reference`` and a limit's ``place``. Its ``prior_odds``, ``share_left``,
                     ``unlisted_nats``, ``nats`` of ``scatter`` and ``chi2_per_n`` of alternatives are null
 finished            whether the search completed
 recordings          names of the trials
@@ -50,8 +50,6 @@ scatter             causes whose places all deviate by more than the tolerance, 
     spread, tolerance              {name: size} of each parameter, standard deviations over the places
     nats                           log odds of the spread over the tolerance
     each                           {robot, joint, place, parameters: {name: {value, se}}} of each place, largest first
-foretold            {as_designed, as_found}: chi2/n of held-out trials for the machine as designed and as fitted to the
-                    other trials; null without scatter or for a single trial
 evidence            strongest candidates: {before, after} without findings and with the findings in the model (or
                     null), lists of {cause, kind, name, family, robot, joint, place, at, nats, needed}
 gain                null if the closed loop was not simulated and there is nothing to estimate, or
@@ -177,7 +175,6 @@ class Told(ABC):
             ],
             "suspected": [self.finding(finding) for finding in v.suspected],
             "scatter": [self.scatter(entry) for entry in v.scatter],
-            "foretold": None,
             "evidence": {"before": self.offers(v.before), "after": self.offers(v.after) if causes else None},
             "gain": gain, "not_simulated": not_simulated, "rollouts": rollouts,
             "undecidable": [*self.undecidable(), *self.blind_spots()],

@@ -21,17 +21,10 @@ FARTHEST = 3
 
 
 def remedy(values: Values) -> str:
-    """Advice for a miscalibrated machine, with the expected improvement."""
+    """Advice for a miscalibrated machine."""
     if is_of_joints(values):
         return "Correct the model by these values, and diagnose again with it."
-    what = 'Find the machine as it is ("mocobot calibrate" does so for a team), and diagnose again with that.'
-    told = values.get("foretold")
-    if told is None:
-        return what
-    return (
-        f"{what} As the other recordings find it, each one is predicted to chi2/n {three_digits(told['as_found'])}, "
-        f"as designed to {three_digits(told['as_designed'])}."
-    )
+    return 'Find the machine as it is ("mocobot calibrate" does so for a team), and diagnose again with that.'
 
 
 def of_response(values: Values) -> list[str]:
