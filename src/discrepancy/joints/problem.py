@@ -536,7 +536,7 @@ class _Builder:
                 shape=(("signal", float(number)),), late=True, family=f"angle of {n}" if read else "",
             )  # fmt: skip
         if t.coulomb[j] or t.viscous[j]:
-            sizes, servo = (float(t.coulomb[j]), float(t.viscous[j])), bool(self.more.loops)
+            sizes, servo = (float(t.coulomb[j]), float(t.viscous[j])), bool(self.more.loops) or self.commanded
             for i, x in enumerate(friction.deviations(self.joints[j], *sizes, FORM, servo=servo)):
                 self.add(f"{n} form {i}", 1.0, {j: x})
 
