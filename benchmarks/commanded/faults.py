@@ -32,7 +32,11 @@ CAUSE = {
     "backlash": "backlash", "soft_stand": "soft_stand", "half_gain": "torque_scale", "friction_tripled": "friction",
     "extra_delay": "torque_delay",
 }  # fmt: skip
-FRICTION = ("friction", "stribeck", "sublinear_friction", "load_friction", "unlisted")
+FRICTION = (
+    "friction", "stribeck", "sublinear_friction", "load_friction", "asymmetric_coulomb", "asymmetric_viscous",
+    "unlisted",
+)  # fmt: skip
+"""True of a gear that rubs otherwise when the load drives it: its friction differs by direction, too."""
 CERTAIN = 0.9
 
 
@@ -80,7 +84,7 @@ def diagnosed(folder: Path, healthy: Path) -> dict[str, Any]:
 
 
 def judged(truth: dict[str, Any], causes: list[list[Any]]) -> tuple[bool, list[str]]:
-    """Whether the fault is named, and false causes at 99 % or more."""
+    """Whether the fault is named, and false causes at 90 % or more."""
     fault, joints = truth["fault"], [*truth["joints"]]
     where = {joints.index(fault["joint"]) + 1} if "joint" in fault else {None, *range(1, len(joints) + 1)}
 
