@@ -536,8 +536,10 @@ class _Builder:
                 shape=(("signal", float(number)),), late=True, family=f"angle of {n}" if read else "",
             )  # fmt: skip
         if t.coulomb[j] or t.viscous[j]:
-            sizes, servo = (float(t.coulomb[j]), float(t.viscous[j])), bool(self.more.loops) or self.commanded
-            for i, x in enumerate(friction.deviations(self.joints[j], *sizes, FORM, servo=servo)):
+            # A model with damping of higher degree tells that another law holds.
+            other = bool(self.more.loops) or (self.commanded and bool(t.drag[j].any()))
+            sizes = float(t.coulomb[j]), float(t.viscous[j])
+            for i, x in enumerate(friction.deviations(self.joints[j], *sizes, FORM, servo=other)):
                 self.add(f"{n} form {i}", 1.0, {j: x})
 
     def _kinds(self) -> None:
