@@ -90,11 +90,11 @@ class ClosedLoop:
     limit: Array
 
     @classmethod
-    def of(cls, s: Signals) -> ClosedLoop:
-        """Begin with the low-passed positions."""
+    def of(cls, s: Signals, *, fast: bool = False) -> ClosedLoop:
+        """Begin with the low-passed positions; ``fast`` drops the last samples for a length that transforms like."""
         log = s.log
         first, last = (int(np.argmin(np.abs(log.time - t))) for t in (s.time[0], s.time[-1]))
-        last = first + (prev_fast_len(last + 1 - first, real=True) or 1) - 1  # drops few samples
+        last = first + (prev_fast_len(last + 1 - first, real=True) or 1) - 1 if fast else last
         every = int(np.ceil(log.period_s / STEP_S - 1e-9))
         here = slice(first, last + 1)
         way = CubicSpline(log.time, low_pass(log.q, log.rate_hz, min(MOTION_HZ, SHARE * log.rate_hz)), axis=0)

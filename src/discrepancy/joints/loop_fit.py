@@ -78,7 +78,7 @@ class LoopFit(Fit):
     forecasts: Forecasts | None = None
 
     def __init__(self, model: SerialModel, trials: Trials) -> None:
-        self.loops = [ClosedLoop.of(s) for s in trials.runs]
+        self.loops = [ClosedLoop.of(s, fast=True) for s in trials.runs]
         self.widened: dict[str, float] = {}
         super().__init__(model, replace(trials, noise=(), kept=()))
         names = [f"payload {model.model.body(b).name} {m}" for b in self.links for m in MOMENTS]
