@@ -373,8 +373,12 @@ class TrialEquations:
             apart = np.cross(np.eye(3)[:, None], lever)
             R = np.concatenate([turned, np.zeros_like(turned)])
             h = np.concatenate([apart, np.broadcast_to(np.eye(3)[:, None], apart.shape)])
-            none = np.zeros((*h.shape[:2], 6))
-            of_base = ArmData(R, h, none, none, none)
+            none, weight = np.zeros((*h.shape[:2], 6)), np.zeros((*h.shape[:2], 6))
+            for k, (along, sign) in enumerate(((1, 1.0), (0, -1.0))):  # weight of the arm in a tilted frame
+                pulled = s.copy()
+                pulled[:, i, SLOTS + 6 + along] += sign * units.gravity_mps2
+                weight[k] = robot_data(pulled, units).wrench[:, i] - data.wrench[:, i]
+            of_base = ArmData(R, h, none, none, weight)
             changed = _chain(i, of_base, data.R_bi[:, i], motion, shared, bases, units.gravity_mps2)
             by_states[:, :, i] = np.moveaxis(changed, 0, -1)
             ahead = s[:, i, SLOTS + 6 : SLOTS + 9] * [1.0, 1.0, 0.0]
@@ -385,13 +389,13 @@ class TrialEquations:
                 jolted = s.copy()
                 jolted[:, i, SLOTS + 6 + k] += _JOLT
                 by_jolts[:, :, i, k] = (self._balance(jolted, units, shared) - here) / _JOLT
-            for k in range(PATHS + 1):
+            for k in range(SCALES):
                 path = np.zeros((*self.rows.s.shape[:2], 9))
                 path[:, i] = _SCALE * self._scaled[:, i, k]
-                by_scales[:, :, i, k] = (self.residual(units, shared, bases, path) - before) / _SCALE
-            # Rocking with the acceleration moves the wrist, whose acceleration enters the balance.
-            by_scales[:, :-6, i, PATHS] = 0.0
-            by_scales[:, -6:, i, PATHS] *= lever[:, None, 2]
+                change = (self.residual(units, shared, bases, path) - before) / _SCALE
+                if k >= PATHS:  # a tilt also moves the wrist, whose acceleration enters the balance
+                    change[:, :-6] = 0.0
+                by_scales[:, :, i, k] += change * (lever[:, None, 2] if k == PATHS else 1.0)
         by_jolts[self.rows.moving :] = 0.0
         order = np.argsort(self.rows.time)
         place, moved = s[order][..., SLOTS : SLOTS + 2], np.empty((n, N, 2))

@@ -488,6 +488,8 @@ def fit(given: Given, learn: int = 1) -> Fit:
     """
     problem = Problem(given)
     layout, basis = problem.layout, problem.basis
+    if not learn:
+        problem.start()  # finds the bases' errors about which the next evaluation is linear
     point, steps, settled, damping = problem.start(), 0, False, 0.0
     before = _with_robots_held(point, layout)
     while True:

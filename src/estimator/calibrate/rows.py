@@ -12,11 +12,14 @@ from scipy.signal import butter, correlate, find_peaks, sosfiltfilt
 from scipy.sparse import csr_array
 
 from estimator.arm.motion import COUNT
+from estimator.arm.unit import Arms
 from estimator.arrays import Array
 from estimator.calibrate import rules
 from estimator.filtering import MIN_SAMPLES, differentiate, low_pass
 from estimator.quantisation import rounding_step
 from estimator.recording.model import Recording
+from estimator.rigid_team import robot_data
+from estimator.so3 import cross, times
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +38,8 @@ class Rows:
         rate_hz: sampling rate.
         repeats: number of times that the same rounding errors occur in a periodic motion, shape (N, 9) or 1.
         scaled: of driving bases, change of pose, rate and acceleration by errors of scale of the odometry (yaw, x, y),
-            and by a displacement in proportion to acceleration, shape (q, N, 4, 9); None for bases that stand.
+            by a displacement in proportion to acceleration, and by ``tilted_paths``, shape (q, N, 5, 9); None for bases
+            that stand.
     """
 
     @property
@@ -89,7 +93,9 @@ class Rows:
         scaled, joints = None, angles
         if recording.base is not None:
             base = with_rates(low_pass(recording.base, rate, cutoff), rate)
-            s, scaled = np.concatenate([s, base], axis=2), with_rates(scaled_paths(base, rate), rate)
+            s = np.concatenate([s, base], axis=2)
+            paths = scaled_paths(base, rate), tilted_paths(s, recording.metadata.arms)[:, :, None]
+            scaled = with_rates(np.concatenate(paths, axis=2), rate)
             joints = np.concatenate([angles, recording.base], axis=2)
 
         stride = max(1, round(rate / rules.SAMPLE_HZ))
@@ -161,6 +167,19 @@ def scaled_paths(base: Array, rate_hz: float) -> Array:
     rows += [[cos * along, sin * along, none], [-sin * across, cos * across, none]]
     path = np.cumsum(np.moveaxis(np.array(rows), (0, 1), (2, 3)), axis=0) / rate_hz
     return np.concatenate([path, base[:, :, None, 6:9] * [1.0, 1.0, 0.0]], axis=2)
+
+
+def tilted_paths(s: Array, arms: Arms) -> Array:
+    """Return how far the wrists move if bases tilt by 1 rad per N m of their load [m/(rad/(N m))], shape (Q, N, 3).
+
+    Args:
+        s: signals of arms and bases, shape (Q, N, 30).
+        arms: the robots.
+    """
+    data = robot_data(s, arms)
+    arm = data.h - s[..., COUNT : COUNT + 3] * [1.0, 1.0, 0.0]
+    moment = -cross(arm, times(data.R_bi, data.wrench[..., 3:])) * [1.0, 1.0, 0.0]
+    return cross(moment, arm - [0.0, 0.0, rules.FLOOR_M]) * [1.0, 1.0, 0.0]
 
 
 def _repeats(angles: Array, rate_hz: float) -> Array | float:
