@@ -25,7 +25,11 @@ def main(
     """Simulate, estimate, print one line a trial, then the table."""
     rows = []
     for seed in range(first, first + trials):
-        recording = mocobot.simulate(payload, "random", seed=seed, vias=vias, drive=ratio)
+        try:
+            recording = mocobot.simulate(payload, "random", seed=seed, vias=vias, drive=ratio)
+        except mocobot.TrialError as error:
+            print(f"{seed} left out: {error}", flush=True)
+            continue
         estimate = mocobot.estimate([recording])
         rows.append(errors(recording.truth.to_dict(), estimate))
         z = ", ".join(f"{np.sqrt(np.mean((e / se) ** 2)):.2f}" for e, se in rows[-1])
