@@ -64,7 +64,9 @@ def told(verdict: JointVerdict, seconds: float) -> None:
     """Print what is named, with its numbers."""
     print(f"  {verdict.verdict}, {seconds:.1f} s of CPU; {verdict.motors[0].torque_per_unit:.4f} N m/V")
     for f in verdict.findings:
-        numbers = [f"{n} {m.values[n]:.4g} +- {m.errors[n]:.2g}" for m in f.members for n in m.values]
+        numbers = [  # the numbers of a law's shape have no error
+            f"{n} {m.values[n]:.4g} +- {m.errors.get(n, 0.0):.2g}" for m in f.members for n in m.values
+        ]
         print(f"  {f.cause}: {', '.join(numbers) or f.of} ({100.0 * f.probability:.0f} %)")
 
 
