@@ -52,7 +52,7 @@ BANDS = np.array([0.0, 0.02, 0.04, 0.08, 0.15, 0.25, 0.35, 0.5])
 """Edges of the bands of the innovations over the log's rate."""
 CHUNK = 64
 """Columns that are filtered at once."""
-Motion = tuple[Array, Array, Array]
+Course = tuple[Array, Array, Array]
 
 
 def commanded(log: JointLog) -> bool:
@@ -126,12 +126,12 @@ class ClosedLoop:
         return self.signals.log.period_s / self.every
 
     @property
-    def middle(self) -> Motion:
+    def middle(self) -> Course:
         """Positions, velocities and accelerations at the middles of the steps, shape (N, J) each."""
         h = self.step_s
         return 0.5 * (self.q[1:] + self.q[:-1]), np.diff(self.q, axis=0) / h, np.diff(self.dq, axis=0) / h
 
-    def seen(self, model: SerialModel, late: Array, motion: Motion | None = None) -> Signals:
+    def seen(self, model: SerialModel, late: Array, motion: Course | None = None) -> Signals:
         """A motion and the torque that the loop asks for in it, at the middles of the steps.
 
         Args:
@@ -253,7 +253,7 @@ class ClosedLoop:
         """Measured positions minus the motion, 0 where there is none, shape (M, J)."""
         return np.nan_to_num(self.measured - self.q[:: self.every])
 
-    def predicted(self, filtered: Filtered, lacking: Array) -> Motion:
+    def predicted(self, filtered: Filtered, lacking: Array) -> Course:
         """The motion as readings up to each step tell it, as ``middle``.
 
         Columns of this motion do not depend on the noise of later readings. In those of the smoothed motion, that noise
