@@ -77,6 +77,21 @@ def test_the_smoother_is_the_conditional_mean(joints):
     )
 
 
+@pytest.mark.parametrize("joints", [1, 2])
+def test_predictions_are_conditional_means_given_the_measurements_so_far(joints):
+    loop, torque, read = system(joints)
+    dense = Dense(loop, torque)
+    begin, end = Filtered.of(loop).predicted(torque[:, :, 0], read)
+    for n in range(STEPS):
+        known = joints * sum(k * EVERY <= n for k in MEASURED)
+        left = read[MEASURED].ravel()[:known] - dense.of_torque[:known, 0]
+        gain = dense.prior @ dense.read[:known].T
+        noise = gain @ np.linalg.solve(dense.covariance[:known, :known], left)
+        for own, at in ((begin, n), (end, n + 1)):
+            wanted = dense.states[at] @ noise + dense.forced[at, :, 0]
+            np.testing.assert_allclose(own[n], wanted, atol=1e-8 * max(1.0, np.abs(wanted).max()))
+
+
 def test_the_cost_of_one_joint_is_its_negative_log_likelihood():
     loop, torque, read = system(1)
     for scale in (1.0, 4.0):
