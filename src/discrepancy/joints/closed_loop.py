@@ -91,7 +91,7 @@ class ClosedLoop:
 
     @classmethod
     def of(cls, s: Signals, *, fast: bool = False) -> ClosedLoop:
-        """Begin with the low-passed positions; ``fast`` drops the last samples for a length that transforms like."""
+        """Begin with the low-passed positions; ``fast`` drops a few last samples, so that transforms are fast."""
         log = s.log
         first, last = (int(np.argmin(np.abs(log.time - t))) for t in (s.time[0], s.time[-1]))
         last = first + (prev_fast_len(last + 1 - first, real=True) or 1) - 1 if fast else last

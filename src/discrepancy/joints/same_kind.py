@@ -61,7 +61,7 @@ class Comparison:
 
     @property
     def unlike(self) -> list[Difference]:
-        """Those that equal machines do not have, largest first: bounds hold for all of them together."""
+        """Differences that equal machines seldom have, largest first; the bound holds for all together (Sidak 1967)."""
         bound = norm.isf(0.5 * (1.0 - (1.0 - CERTAIN) ** (1.0 / max(len(self.differences), 1))))
         return sorted((d for d in self.differences if d.size > bound), key=lambda d: -d.size)
 
